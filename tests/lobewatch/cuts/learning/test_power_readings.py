@@ -14,7 +14,7 @@ from lobewatch.cuts.learning.drive_gain import power_log_likelihood
 from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
 from lobewatch.cuts.learning.power_readings import find_reading_remarks, merge_readings
 from lobewatch.machine.folder_updates import make_observed_cut
-from lobewatch.machine.journal.entries import CutEntry, parse_cut_line
+from lobewatch.machine.journal.entries import CutEntry, CutVerdict, parse_cut_line
 from lobewatch.machine.settings.machine_file import Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import find_cut_setting
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
@@ -98,6 +98,14 @@ def test_a_reading_teaches_kt_and_nothing_else(mill: Mill) -> None:
     assert abs(after["tangential"].mean - 0.8) < 0.12
     for name in ("ratio", "damping_x", "stiffness_y"):
         assert after[name].mean == pytest.approx(before[name].mean, rel=0.05)
+
+
+@pytest.mark.parametrize(("verdict", "depth"), [("stable", 2.5e-3), ("chatter", 4e-3)])
+def test_a_reading_at_the_place_of_a_cut_is_no_verdict_on_it(mill: Mill, verdict: CutVerdict, depth: float) -> None:
+    made = CutEvidence(SLOT, 12000, depth, verdict, 1700.0 if verdict == "chatter" else float("nan"))
+    read = replace(made, verdict="cannot tell", frequency=float("nan"), power=PowerEvidence(1.1, 1e3, 1e3))
+    alone, both = mill.prior.learn_from(made), mill.prior.learn_from(read).learn_from(made)
+    assert both.log_weight - alone.log_weight == pytest.approx(np.zeros(len(alone.samples)), abs=0.01)
 
 
 def test_the_gain_is_common_to_all_materials(mill: Mill) -> None:

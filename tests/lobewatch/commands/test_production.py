@@ -67,6 +67,7 @@ def test_a_power_without_a_verdict_is_stored_and_counts_once_a_day(mill: Shop) -
     assert observe(mill, "--power", "1.1")["next_step"] == made["next_step"]
     assert answer(mill, "suggest", "--program", "A")["cuts_made"] == 0
     assert "power reading" in invoke(["history", str(mill.path)]).stdout
+    assert "cuts-without-verdict" not in invoke(["check", str(mill.path), "--json"]).stdout
 
 
 def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing(mill: Shop) -> None:

@@ -46,7 +46,10 @@ def test_a_recommendation_ends_in_ordinary_cuts_and_each_cut_names_the_next(mill
     first = ladder["steps"][0]
     place = "--speed", f"{first['speed_rpm']:g}", "--depth", f"{first['depth_mm']:g}"
     made = observe(mill, *place, "--stable", "--power", f"{0.8 * first['expected_power_kw']:.3f}")
-    assert made["next_step"]["speed_rpm"] * made["next_step"]["depth_mm"] > rates[0]
+    rate = made["next_step"]["speed_rpm"] * made["next_step"]["depth_mm"]
+    assert rate > rates[0]
+    shown, expected = made["next_step"]["expected_power_kw"] / rate, first["expected_power_kw"] / rates[0]
+    assert 0.75 * expected < shown < 0.95 * expected
     assert made["asks"] is None
 
 

@@ -73,10 +73,11 @@ def test_many_readings_of_one_program_and_day_count_as_one(machine: Machine) -> 
 
 
 def test_a_busy_day_outweighs_no_other_day_and_one_wrong_reading_moves_nothing(machine: Machine) -> None:
-    days = [reading(machine, 1.0, 0.01 * k) for k in range(9)] + [reading(machine, 1.2, 1), reading(machine, 1.2, 2)]
+    days = [reading(machine, 1.0, 0.01 * k) for k in range(9)]
+    days += [reading(machine, power, day) for day, power in ((1, 1.2), (3, 1.2), (2, 1.9))]
     ((merged, count),) = merge_readings(days)
     assert merged.power is not None
-    assert count == 3
+    assert (merged.id, count) == ("c3", 4)
     assert merged.power.tangential == pytest.approx(reading(machine, 1.2).power.tangential)  # type: ignore[union-attr]
 
 

@@ -11,12 +11,15 @@ import pytest
 
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.drive_gain import power_log_likelihood
-from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
+from lobewatch.cuts.learning.posterior import Contradiction, inconsistent_cut_remarks
 from lobewatch.cuts.learning.power_readings import find_reading_remarks, merge_readings
+from lobewatch.cuts.learning.program_learning import learn_program
 from lobewatch.machine.folder_updates import make_observed_cut
 from lobewatch.machine.journal.entries import CutEntry, CutVerdict, parse_cut_line
 from lobewatch.machine.settings.machine_file import Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tool.assembly import Assembly
+from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 START = datetime(2026, 5, 4, 6, tzinfo=UTC)
@@ -145,6 +148,17 @@ def test_powers_of_another_program_of_another_day_and_of_another_material_are_as
     asked = "material-contradicted"
     for word, share, is_asked in (("cannot tell", 0.52, False), ("chatter", 1.9, True), ("chatter", 0.47, False)):
         assert codes(machine, replace(reading(machine, share * usual), word=word)).count(asked) == is_asked
+
+
+@pytest.mark.parametrize("share", [0.45, 0.8, 2.2])
+def test_a_reading_off_by_two_is_asked_about_and_never_makes_kt_smaller(machine: Machine, share: float) -> None:
+    x, y = [Mode(1713.0, 0.029, 3.5e7)], [Mode(1400.0, 0.035, 2.5e7)]
+    tool = Assembly("reference", START, "drawn", x, y, ("x", "y"), None, {}, False, ())
+    entry = reading(machine, share * expected_kilowatts(machine))
+    found = learn_program(machine.program[0], tool, machine, [entry])
+    before, after = (one.intervals["tangential"].mean for one in (found.prior, found.posterior))
+    assert [odd.contradiction for odd in found.inconsistent_cuts] == [Contradiction.MATERIAL] * (share != 0.8)
+    assert np.sign(round(after - before, 6)) == {0.45: 0, 0.8: -1, 2.2: 1}[share]
 
 
 @pytest.mark.parametrize("kilowatts", [0.3, 1100.0, 31.0])

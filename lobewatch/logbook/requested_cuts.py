@@ -125,7 +125,10 @@ def _mention_cuts_without_verdict(logbook: Logbook, verdict: Verdict) -> Verdict
     found = [
         f"{cut.id} ({cut.reason})"
         for cut in logbook.files.contents.cuts
-        if cut.word == "cannot tell" and cut.reason != POWER_READING and not cut.excluded and (since is None or cut.at >= since)
+        if cut.word == "cannot tell"
+        and cut.reason != POWER_READING
+        and not cut.excluded
+        and (since is None or cut.at >= since)
         if cut.tool == program.tool and cut.program in (program.name, None)
     ]
     if not found:

@@ -146,8 +146,9 @@ def test_powers_of_another_program_of_another_day_and_of_another_material_are_as
     assert codes(machine, reading(machine, 2.3 * usual)) == ["material-contradicted"]
     assert codes(machine, reading(machine, 1.4 * usual)) == []
     asked = "material-contradicted"
-    for word, share, is_asked in (("cannot tell", 0.52, False), ("chatter", 1.9, True), ("chatter", 0.47, False)):
-        assert codes(machine, replace(reading(machine, share * usual), word=word)).count(asked) == is_asked
+    assert asked not in codes(machine, reading(machine, 0.52 * usual))
+    for share, is_asked in ((1.9, True), (0.47, False)):
+        assert codes(machine, replace(reading(machine, share * usual), word="chatter")).count(asked) == is_asked
 
 
 @pytest.mark.parametrize("share", [0.45, 0.8, 2.2])

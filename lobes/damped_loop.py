@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -19,14 +18,12 @@ Receptances = Callable[[Floats], tuple[Complexes, Complexes, Complexes]]
 
 
 class _LoopParts(NamedTuple):
-    """Parts of the loop matrix that do not depend on the speed, at some frequencies, shape (r, k) each."""
+    """Parts of the loop matrix that do not depend on the speed, at some frequencies, shape (2, 2, r, k) each."""
 
     cutting: Complexes
-    """Trace of H0 G (1/m)."""
+    """H0 G (1/m)."""
     damping: Complexes
-    """Trace of C / D N0 G (1/m)."""
-    flexibility: Complexes
-    """Determinant of G (m^2/N^2)."""
+    """C / D N0 (G - J / (i w)) (1/m)."""
 
 
 class _Steps(NamedTuple):
@@ -58,7 +55,8 @@ class DampedLoop:
 
         L = eigenvalue of ((1 - exp(-i w tau)) H0 + 2 i N (f_c / f_t) (C / D) N0) G,     b = -1 / L,
 
-    as i w C / V = 2 i N (f_c / f_t) C / D. The lowest b counts for which L is real and negative. For uneven teeth the
+    as i w C / V = 2 i N (f_c / f_t) C / D. Truncated complex modes jump with a force by J: process damping resists
+    their free motion, N0 (G - J / (i w)), as in `lobes.floquet.damped_response`. The lowest b counts for which L is real and negative. For uneven teeth the
     regeneration is the mean over the delays.
     Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Tyler & Schmitz, J. Manuf. Process. 15 (2013) 69-76, who
     find the same b by iteration.
@@ -72,6 +70,8 @@ class DampedLoop:
     """Mean process damping matrices C / D N0 (Pa), shape (r, 2, 2)."""
     receptance: Receptances
     """Receptances of all systems."""
+    jump: Floats
+    """Velocity J of the tip per force at once (m/s/N), shape (r, 2, 2); 0 without complex modes."""
 
     def limits(self, grid: Floats, tooth_frequency: Floats) -> tuple[Floats, Floats]:
         """Return the lowest limit (m) and its frequency (Hz) at tooth frequencies (r, s) in Hz, each of shape (r, s).
@@ -93,20 +93,11 @@ class DampedLoop:
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)
-        cutting, damping = (
-            part[:, 0, 0, np.newaxis] * xx
-            + part[:, 1, 1, np.newaxis] * yy
-            + (part[:, 0, 1] + part[:, 1, 0])[:, np.newaxis] * xy
-            for part in (self.force, self.damping)
-        )
-        return _LoopParts(cutting, damping, xx * yy - xy**2)
-
-    @cached_property
-    def _determinants(self) -> tuple[Floats, Floats, Floats]:
-        """Factors of s^2, s r and r^2 in the determinant of s H0 + r C / D N0, shape (r, 1) each."""
-        (h, a), (b, k) = np.moveaxis(self.force, 0, -1)[..., np.newaxis]
-        (n, c), (d, m) = np.moveaxis(self.damping, 0, -1)[..., np.newaxis]
-        return h * k - a * b, h * m + n * k - a * d - c * b, n * m - c * d
+        shown = np.array([[xx, xy + 0 * xx], [xy + 0 * xx, yy]])
+        jump = np.moveaxis(self.jump, 0, -1)[..., np.newaxis]
+        moving = shown + 1j / (2 * np.pi * frequency) * jump if np.any(jump) else shown
+        pairs = (self.force, shown), (self.damping, moving)
+        return _LoopParts(*(np.einsum("rij,jlrk->ilrk", matrix, part) for matrix, part in pairs))
 
     def _eigenvalues(
         self, parts: _LoopParts, frequency: Floats, tooth_frequency: Floats
@@ -114,10 +105,9 @@ class DampedLoop:
         """Return mean and half difference of both loops (1/m), shape (r, k) each."""
         waves = frequency / tooth_frequency
         gain, rate = mean_regeneration(self.cut, waves), 2j * self.cut.teeth * waves
-        cutting, both, damping = self._determinants
-        determinant = (gain * (gain * cutting + rate * both) + rate**2 * damping) * parts.flexibility
-        half = (gain * parts.cutting + rate * parts.damping) / 2
-        return half, np.sqrt(half**2 - determinant)
+        (xx, xy), (yx, yy) = gain * parts.cutting + rate * parts.damping
+        half = (xx + yy) / 2
+        return half, np.sqrt(half**2 - (xx * yy - xy * yx))
 
     def _lowest_step(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
         """Return the step of the lowest limit of each system at its tooth frequency (r, 1); of zeros without one."""

@@ -12,6 +12,8 @@ from modal.arrays import Complexes, Floats
 
 REFINEMENT_STEPS = 4
 """Steps of the false position that refine a crossing."""
+REFINED_STEPS = 6
+"""Number of steps of the lowest crossings that are refined, as crossings of many lobes are nearly equal; chosen."""
 
 Receptances = Callable[[Floats], tuple[Complexes, Complexes, Complexes]]
 """Function from frequencies (r, k) in Hz to the receptances xx, yy and xy (m/N), each of shape (r, k)."""
@@ -80,16 +82,19 @@ class DampedLoop:
         system may have r tooth frequencies (r, 1) with a grid (1, k).
         """
         parts = self._parts(grid)
-        found = [self._lowest_step(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
-        steps = _Steps._make(np.stack(part, axis=1) for part in zip(*found, strict=True))
+        found = [self._lowest_steps(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
+        steps = _Steps._make(np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        repeated = np.repeat(tooth_frequency, REFINED_STEPS, axis=1)
         for _ in range(REFINEMENT_STEPS):
             frequency, near = steps.interpolate()
-            half, root = self._eigenvalues(self._parts(frequency), frequency, tooth_frequency)
+            half, root = self._eigenvalues(self._parts(frequency), frequency, repeated)
             is_first = np.abs(half + root - near) < np.abs(half - root - near)
             steps = steps.narrow(frequency, np.where(is_first, half + root, half - root))
-        frequency, loop = steps.interpolate()
-        limited = loop.real < 0
-        return np.where(limited, -1 / np.where(limited, loop.real, -1.0), np.inf), np.where(limited, frequency, np.nan)
+        frequency, loop = (part.reshape(*tooth_frequency.shape, REFINED_STEPS) for part in steps.interpolate())
+        lowest = np.argmin(loop.real, axis=-1)[..., np.newaxis]
+        frequency, size = (np.take_along_axis(part, lowest, axis=-1)[..., 0] for part in (frequency, loop.real))
+        limited = size < 0
+        return np.where(limited, -1 / np.where(limited, size, -1.0), np.inf), np.where(limited, frequency, np.nan)
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)
@@ -109,17 +114,17 @@ class DampedLoop:
         half = (xx + yy) / 2
         return half, np.sqrt(half**2 - (xx * yy - xy * yx))
 
-    def _lowest_step(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
-        """Return the step of the lowest limit of each system at its tooth frequency (r, 1); of zeros without one."""
+    def _lowest_steps(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
+        """Return the steps (r, `REFINED_STEPS`) of the lowest limits at tooth frequencies (r, 1); else of zeros."""
         half, root = self._eigenvalues(parts, grid, tooth_frequency)
         root[:, 1:] *= np.cumprod(np.where(np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0, -1.0, 1.0), axis=1)
         loop = np.stack((half + root, half - root), axis=1)
         row, branch, step = np.nonzero((loop.imag[..., 1:] < 0) != (loop.imag[..., :-1] < 0))
-        ends = loop[row, branch, step], loop[row, branch, step + 1]
         at = np.broadcast_to(grid, half.shape)
-        steps = _Steps(at[row, step], at[row, step + 1], *ends)
+        steps = _Steps(at[row, step], at[row, step + 1], loop[row, branch, step], loop[row, branch, step + 1])
         order = np.lexsort((steps.interpolate()[1].real, row))
-        first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-        lowest = np.zeros((4, len(half)), np.complex128)
-        lowest[:, row[first]] = np.array(steps)[:, first]
+        rank = np.arange(row.size) - np.searchsorted(row[order], row[order])
+        few = rank < REFINED_STEPS
+        lowest = np.zeros((4, len(half), REFINED_STEPS), np.complex128)
+        lowest[:, row[order][few], rank[few]] = np.array(steps)[:, order[few]]
         return _Steps(lowest[0].real, lowest[1].real, lowest[2], lowest[3])

@@ -165,7 +165,7 @@ class ProgramSamples:
         return replace(self, rows=scale_fields(rows, speed_rpm=n, tangential=push, radial=push))
 
 
-DISTINGUISHED_LIMIT_RATIO = 4.0
+DISTINGUISHED_LIMIT_RATIO = 2.0
 """Largest limit over the deepest checked depth that is told apart; chosen."""
 
 

@@ -58,8 +58,8 @@ class DampedLoop:
         L = eigenvalue of ((1 - exp(-i w tau)) H0 + 2 i N (f_c / f_t) (C / D) N0) G,     b = -1 / L,
 
     as i w C / V = 2 i N (f_c / f_t) C / D. Truncated complex modes jump with a force by J: process damping resists
-    their free motion, N0 (G - J / (i w)), as in `lobes.floquet.damped_response`. The lowest b counts for which L is real and negative. For uneven teeth the
-    regeneration is the mean over the delays.
+    their free motion, N0 (G - J / (i w)), as in `lobes.floquet.damped_response`. The lowest b counts for which L is
+    real and negative. For uneven teeth the regeneration is the mean over the delays.
     Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Tyler & Schmitz, J. Manuf. Process. 15 (2013) 69-76, who
     find the same b by iteration.
     """
@@ -100,7 +100,7 @@ class DampedLoop:
         xx, yy, xy = self.receptance(frequency)
         shown = np.array([[xx, xy + 0 * xx], [xy + 0 * xx, yy]])
         jump = np.moveaxis(self.jump, 0, -1)[..., np.newaxis]
-        moving = shown + 1j / (2 * np.pi * frequency) * jump if np.any(jump) else shown
+        moving = shown + 0.5j / np.pi / np.where(frequency > 0, frequency, 1.0) * jump if np.any(jump) else shown
         pairs = (self.force, shown), (self.damping, moving)
         return _LoopParts(*(np.einsum("rij,jlrk->ilrk", matrix, part) for matrix, part in pairs))
 

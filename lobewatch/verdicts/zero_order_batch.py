@@ -106,7 +106,8 @@ class ZeroOrderBatch:
         if not np.all(undamped):
             damped = np.flatnonzero(~undamped)
             for few in np.array_split(damped, -(-damped.size // DAMPED_SPINDLES_AT_ONCE)):
-                depth[few], chatter[few] = self[few]._damped_limits(speeds[few], deepest)
+                spindles = ZeroOrderBatch(self.rows[few], self.force[few])
+                depth[few], chatter[few] = spindles._damped_limits(speeds[few], deepest)
             if np.any(undamped):
                 depth[undamped], chatter[undamped] = self[undamped].limits(speeds[undamped], deepest)
             return depth, chatter

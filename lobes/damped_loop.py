@@ -90,11 +90,12 @@ class DampedLoop:
             half, root = self._eigenvalues(self._parts(frequency), frequency, repeated)
             is_first = np.abs(half + root - near) < np.abs(half - root - near)
             steps = steps.narrow(frequency, np.where(is_first, half + root, half - root))
-        frequency, loop = (part.reshape(*tooth_frequency.shape, REFINED_STEPS) for part in steps.interpolate())
-        lowest = np.argmin(loop.real, axis=-1)[..., np.newaxis]
-        frequency, size = (np.take_along_axis(part, lowest, axis=-1)[..., 0] for part in (frequency, loop.real))
+        refined, loop = steps.interpolate()
+        parts_at = [part.reshape(*tooth_frequency.shape, REFINED_STEPS) for part in (refined, loop.real)]
+        lowest = np.argmin(parts_at[1], axis=-1)[..., np.newaxis]
+        chatter, size = (np.take_along_axis(part, lowest, axis=-1)[..., 0] for part in parts_at)
         limited = size < 0
-        return np.where(limited, -1 / np.where(limited, size, -1.0), np.inf), np.where(limited, frequency, np.nan)
+        return np.where(limited, -1 / np.where(limited, size, -1.0), np.inf), np.where(limited, chatter, np.nan)
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)

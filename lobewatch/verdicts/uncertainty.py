@@ -29,7 +29,7 @@ MAX_MODE_PHASE = np.radians(89)
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients by tool wear; chosen."""
 WORN_LAND_UM = 300.0
-"""Width of the wear land of a worn edge: end of tool life by uniform flank wear in ISO 8688-2 (um)."""
+"""Width of the wear land of a worn edge (um): assumed, as the end of tool life quoted from ISO 8688-2."""
 
 
 RecordT = TypeVar("RecordT", MillingRows, Mode)

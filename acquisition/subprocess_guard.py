@@ -1,10 +1,14 @@
 """Run fragile code in a subprocess with limits on time and memory."""
 
+import atexit
+import json
 import math
 import os
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 if os.name != "nt":
@@ -21,17 +25,91 @@ def run_in_subprocess(
 
     Raises subprocess.SubprocessError where it fails, crashes or takes longer than `patience` (s).
     """
-    command = [sys.executable, "-P", "-Wignore", "-m", module, *arguments]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     return subprocess.run(
-        command,
-        env=environment,
+        _make_command(module, *arguments),
+        env=_make_environment(),
         input=content,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         timeout=patience,
         check=True,
     ).stdout
+
+
+class SubprocessService:
+    """Subprocess that works on one request after another, because its start takes longer than most of them.
+
+    Its module calls `read_requests`. After a crash the next request starts it again.
+    """
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+        self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def request(self, argument: str, patience: float = SUBPROCESS_TIMEOUT) -> None:
+        """Wait until the subprocess has worked on an argument.
+
+        Raises subprocess.SubprocessError where it crashes or takes longer than `patience` (s).
+        """
+        with self._lock:
+            if self._process is None:
+                self._process = subprocess.Popen(
+                    _make_command(self._module),
+                    env=_make_environment(),
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.DEVNULL,
+                )
+                atexit.register(self.close)
+            is_answered = False
+            try:
+                is_answered = _exchange_line(self._process, argument, patience)
+            finally:
+                if not is_answered:  # also after Ctrl-C: a late answer must not count for the next request
+                    self.close()
+            if not is_answered:
+                raise subprocess.SubprocessError(f"{self._module} crashed or took too long")
+
+    def close(self) -> None:
+        """End the subprocess."""
+        process, self._process = self._process, None
+        atexit.unregister(self.close)
+        if process is not None:
+            process.kill()
+            process.communicate()
+
+
+def _exchange_line(process: subprocess.Popen[bytes], argument: str, patience: float) -> bool:
+    """Send an argument as a line and wait for the line that answers it. False without one."""
+    assert process.stdin is not None
+    assert process.stdout is not None
+    watch = threading.Timer(patience, process.kill)
+    watch.start()
+    try:
+        process.stdin.write(json.dumps(argument).encode() + b"\n")
+        process.stdin.flush()
+        return process.stdout.readline() != b""
+    except OSError:
+        return False
+    finally:
+        watch.cancel()
+
+
+def read_requests() -> Iterator[str]:
+    """Yield the arguments that a `SubprocessService` sends, and answer each after the work on it."""
+    for line in sys.stdin:
+        yield json.loads(line)
+        sys.stdout.write("\n")
+        sys.stdout.flush()
+
+
+def _make_command(module: str, *arguments: str) -> list[str]:
+    return [sys.executable, "-P", "-Wignore", "-m", module, *arguments]
+
+
+def _make_environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 def limit_resources(seconds: float, memory: float) -> None:

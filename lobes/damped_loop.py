@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,20 +12,20 @@ from modal.arrays import Complexes, Floats
 
 REFINEMENT_STEPS = 4
 """Steps of the false position that refine a crossing."""
+REFINED_STEPS = 6
+"""Number of steps of the lowest crossings that are refined, as crossings of many lobes are nearly equal; chosen."""
 
 Receptances = Callable[[Floats], tuple[Complexes, Complexes, Complexes]]
 """Function from frequencies (r, k) in Hz to the receptances xx, yy and xy (m/N), each of shape (r, k)."""
 
 
 class _LoopParts(NamedTuple):
-    """Parts of the loop matrix that do not depend on the speed, at some frequencies, shape (r, k) each."""
+    """Parts of the loop matrix that do not depend on the speed, at some frequencies, shape (2, 2, r, k) each."""
 
     cutting: Complexes
-    """Trace of H0 G (1/m)."""
+    """H0 G (1/m)."""
     damping: Complexes
-    """Trace of C / D N0 G (1/m)."""
-    flexibility: Complexes
-    """Determinant of G (m^2/N^2)."""
+    """C / D N0 (G - J / (i w)) (1/m)."""
 
 
 class _Steps(NamedTuple):
@@ -58,8 +57,9 @@ class DampedLoop:
 
         L = eigenvalue of ((1 - exp(-i w tau)) H0 + 2 i N (f_c / f_t) (C / D) N0) G,     b = -1 / L,
 
-    as i w C / V = 2 i N (f_c / f_t) C / D. The lowest b counts for which L is real and negative. For uneven teeth the
-    regeneration is the mean over the delays.
+    as i w C / V = 2 i N (f_c / f_t) C / D. Truncated complex modes jump with a force by J: process damping resists
+    their free motion, N0 (G - J / (i w)), as in `lobes.floquet.damped_response`. The lowest b counts for which L is
+    real and negative. For uneven teeth the regeneration is the mean over the delays.
     Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Tyler & Schmitz, J. Manuf. Process. 15 (2013) 69-76, who
     find the same b by iteration.
     """
@@ -72,6 +72,8 @@ class DampedLoop:
     """Mean process damping matrices C / D N0 (Pa), shape (r, 2, 2)."""
     receptance: Receptances
     """Receptances of all systems."""
+    jump: Floats
+    """Velocity J of the tip per force at once (m/s/N), shape (r, 2, 2); 0 without complex modes."""
 
     def limits(self, grid: Floats, tooth_frequency: Floats) -> tuple[Floats, Floats]:
         """Return the lowest limit (m) and its frequency (Hz) at tooth frequencies (r, s) in Hz, each of shape (r, s).
@@ -80,33 +82,28 @@ class DampedLoop:
         system may have r tooth frequencies (r, 1) with a grid (1, k).
         """
         parts = self._parts(grid)
-        found = [self._lowest_step(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
-        steps = _Steps._make(np.stack(part, axis=1) for part in zip(*found, strict=True))
+        found = [self._lowest_steps(grid, parts, teeth[:, np.newaxis]) for teeth in tooth_frequency.T]
+        steps = _Steps._make(np.concatenate(part, axis=1) for part in zip(*found, strict=True))
+        repeated = np.repeat(tooth_frequency, REFINED_STEPS, axis=1)
         for _ in range(REFINEMENT_STEPS):
             frequency, near = steps.interpolate()
-            half, root = self._eigenvalues(self._parts(frequency), frequency, tooth_frequency)
+            half, root = self._eigenvalues(self._parts(frequency), frequency, repeated)
             is_first = np.abs(half + root - near) < np.abs(half - root - near)
             steps = steps.narrow(frequency, np.where(is_first, half + root, half - root))
-        frequency, loop = steps.interpolate()
-        limited = loop.real < 0
-        return np.where(limited, -1 / np.where(limited, loop.real, -1.0), np.inf), np.where(limited, frequency, np.nan)
+        refined, loop = steps.interpolate()
+        parts_at = [part.reshape(*tooth_frequency.shape, REFINED_STEPS) for part in (refined, loop.real)]
+        lowest = np.argmin(parts_at[1], axis=-1)[..., np.newaxis]
+        chatter, size = (np.take_along_axis(part, lowest, axis=-1)[..., 0] for part in parts_at)
+        limited = size < 0
+        return np.where(limited, -1 / np.where(limited, size, -1.0), np.inf), np.where(limited, chatter, np.nan)
 
     def _parts(self, frequency: Floats) -> _LoopParts:
         xx, yy, xy = self.receptance(frequency)
-        cutting, damping = (
-            part[:, 0, 0, np.newaxis] * xx
-            + part[:, 1, 1, np.newaxis] * yy
-            + (part[:, 0, 1] + part[:, 1, 0])[:, np.newaxis] * xy
-            for part in (self.force, self.damping)
-        )
-        return _LoopParts(cutting, damping, xx * yy - xy**2)
-
-    @cached_property
-    def _determinants(self) -> tuple[Floats, Floats, Floats]:
-        """Factors of s^2, s r and r^2 in the determinant of s H0 + r C / D N0, shape (r, 1) each."""
-        (h, a), (b, k) = np.moveaxis(self.force, 0, -1)[..., np.newaxis]
-        (n, c), (d, m) = np.moveaxis(self.damping, 0, -1)[..., np.newaxis]
-        return h * k - a * b, h * m + n * k - a * d - c * b, n * m - c * d
+        shown = np.array([[xx, xy + 0 * xx], [xy + 0 * xx, yy]])
+        jump = np.moveaxis(self.jump, 0, -1)[..., np.newaxis]
+        moving = shown + 0.5j / np.pi / np.where(frequency > 0, frequency, 1.0) * jump if np.any(jump) else shown
+        pairs = (self.force, shown), (self.damping, moving)
+        return _LoopParts(*(np.einsum("rij,jlrk->ilrk", matrix, part) for matrix, part in pairs))
 
     def _eigenvalues(
         self, parts: _LoopParts, frequency: Floats, tooth_frequency: Floats
@@ -114,22 +111,21 @@ class DampedLoop:
         """Return mean and half difference of both loops (1/m), shape (r, k) each."""
         waves = frequency / tooth_frequency
         gain, rate = mean_regeneration(self.cut, waves), 2j * self.cut.teeth * waves
-        cutting, both, damping = self._determinants
-        determinant = (gain * (gain * cutting + rate * both) + rate**2 * damping) * parts.flexibility
-        half = (gain * parts.cutting + rate * parts.damping) / 2
-        return half, np.sqrt(half**2 - determinant)
+        (xx, xy), (yx, yy) = gain * parts.cutting + rate * parts.damping
+        half = (xx + yy) / 2
+        return half, np.sqrt(half**2 - (xx * yy - xy * yx))
 
-    def _lowest_step(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
-        """Return the step of the lowest limit of each system at its tooth frequency (r, 1); of zeros without one."""
+    def _lowest_steps(self, grid: Floats, parts: _LoopParts, tooth_frequency: Floats) -> _Steps:
+        """Return the steps (r, `REFINED_STEPS`) of the lowest limits at tooth frequencies (r, 1); else of zeros."""
         half, root = self._eigenvalues(parts, grid, tooth_frequency)
         root[:, 1:] *= np.cumprod(np.where(np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0, -1.0, 1.0), axis=1)
         loop = np.stack((half + root, half - root), axis=1)
         row, branch, step = np.nonzero((loop.imag[..., 1:] < 0) != (loop.imag[..., :-1] < 0))
-        ends = loop[row, branch, step], loop[row, branch, step + 1]
         at = np.broadcast_to(grid, half.shape)
-        steps = _Steps(at[row, step], at[row, step + 1], *ends)
+        steps = _Steps(at[row, step], at[row, step + 1], loop[row, branch, step], loop[row, branch, step + 1])
         order = np.lexsort((steps.interpolate()[1].real, row))
-        first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
-        lowest = np.zeros((4, len(half)), np.complex128)
-        lowest[:, row[first]] = np.array(steps)[:, first]
+        rank = np.arange(row.size) - np.searchsorted(row[order], row[order])
+        few = rank < REFINED_STEPS
+        lowest = np.zeros((4, len(half), REFINED_STEPS), np.complex128)
+        lowest[:, row[order][few], rank[few]] = np.array(steps)[:, order[few]]
         return _Steps(lowest[0].real, lowest[1].real, lowest[2], lowest[3])

@@ -104,7 +104,8 @@ def _with_process_damping(lobes: StabilityLobes, cut: Cut, tips: Mapping[int, Ti
         return xx, yy, xy
 
     size = TipResponse(common_grid([*tips.values()]), lambda f: np.sum(np.abs(receptances(f)), axis=0) + 0j)
-    loop = DampedLoop(cut, mean_force(cut)[np.newaxis], mean_damping(cut)[np.newaxis], receptances)
+    force, damping = mean_force(cut)[np.newaxis], mean_damping(cut)[np.newaxis]
+    loop = DampedLoop(cut, force, damping, receptances, np.zeros(force.shape))
     teeth = cut.teeth * lobes.speed_rpm / 60
     depth, chatter = np.empty((2, teeth.size))
     for rows, grid in frequency_blocks(size, cut, teeth):

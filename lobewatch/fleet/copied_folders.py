@@ -9,7 +9,7 @@ import msgspec
 
 from acquisition import Remark
 from acquisition.file_io import open_regular_file
-from lobewatch.machine.folder_files import format_path
+from lobewatch.machine.journal.file_names import format_path
 from lobewatch.monitoring.status_rules import FOLDER_COPIED
 
 TAP_LINE_MARK = b'"kind": "tap"'
@@ -37,7 +37,8 @@ def find_copies(machines: Mapping[str, Path]) -> dict[str, Remark]:
     folders = {key: str(path) for key, path in machines.items()}
     if len(machines) == 1:
         (path,) = machines.values()
-        folders |= {name: f"{path.resolve().parent}/{name}" for name in _list_neighbors(path)}
+        place = path.resolve()
+        folders |= {name: f"{place.parent}/{name}" for name in _list_neighbors(place)}
     by_first: dict[tuple[str, str], list[str]] = {}
     for key, folder in folders.items():
         by_first.setdefault(read_first_tap(folder), []).append(key)
@@ -50,11 +51,11 @@ def find_copies(machines: Mapping[str, Path]) -> dict[str, Remark]:
     return found
 
 
-def _list_neighbors(path: Path) -> list[str]:
-    """List the other folders in the parent folder of a machine."""
+def _list_neighbors(place: Path) -> list[str]:
+    """List the other folders in the parent folder of a machine. place: its absolute path, without links."""
     try:
-        with os.scandir(path.resolve().parent) as entries:
-            return sorted(format_path(entry.name) for entry in entries if entry.name != path.resolve().name)
+        with os.scandir(place.parent) as entries:
+            return sorted(format_path(entry.name) for entry in entries if entry.name != place.name)
     except OSError:
         return []
 

@@ -15,7 +15,8 @@ from acquisition.errors import format_error
 from lobewatch.fleet import machine_summary
 from lobewatch.fleet.copied_folders import find_copies
 from lobewatch.fleet.machine_summary import DatedStatus, MachineSummary, read_summary
-from lobewatch.machine.folder_files import compute_change_mark, format_path
+from lobewatch.machine.folder_files import compute_change_mark
+from lobewatch.machine.journal.file_names import format_path
 from lobewatch.monitoring.status_rules import StatusLevel
 
 VERIFY_INTERVAL = 6 * 3600.0

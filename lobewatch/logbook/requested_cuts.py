@@ -15,6 +15,7 @@ from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.heard_cuts import is_tool_untapped, is_untapped
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import ProgramTable
+from lobewatch.machine.journal.entries import POWER_READING
 from lobewatch.machine.settings import requested_cut
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 from lobewatch.verdicts.pitch_proposal import PitchProposal, propose_pitch
@@ -124,7 +125,10 @@ def _mention_cuts_without_verdict(logbook: Logbook, verdict: Verdict) -> Verdict
     found = [
         f"{cut.id} ({cut.reason})"
         for cut in logbook.files.contents.cuts
-        if cut.word == "cannot tell" and not cut.excluded and (since is None or cut.at >= since)
+        if cut.word == "cannot tell"
+        and cut.reason != POWER_READING
+        and not cut.excluded
+        and (since is None or cut.at >= since)
         if cut.tool == program.tool and cut.program in (program.name, None)
     ]
     if not found:

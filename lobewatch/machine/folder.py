@@ -18,11 +18,12 @@ import msgspec
 from acquisition import DataError, HitDecision, Remark, TapTest, read_tap, write_tap
 from acquisition.file_io import delete_folder, make_folder, open_regular_file, read_regular_file, rename, sync_folder
 from acquisition.hit_quality.decide_hits import decide_stored_hits
-from lobewatch.machine.folder_files import compute_change_mark, format_path, to_folder_path
+from lobewatch.machine.folder_files import compute_change_mark, to_folder_path
 from lobewatch.machine.folder_lock import LOCK_TIMEOUT, FolderLock
 from lobewatch.machine.journal import read_entries as journal_entries
 from lobewatch.machine.journal.alarm_entries import Acknowledgement, FleetScatter
 from lobewatch.machine.journal.entries import CutEntry, RecordingFile
+from lobewatch.machine.journal.file_names import format_path
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command, journal_damage_remark, make_entry
 from lobewatch.machine.journal.mass_checks import MassCheckEntry
 from lobewatch.machine.journal.sync_conflicts import conflict_remark, list_sync_remarks

@@ -26,11 +26,6 @@ def to_folder_path(name: Path | str) -> Path:
     return Path(name)
 
 
-def format_path(path: Path | str) -> str:
-    """Return a path as valid UTF-8, with invalid bytes escaped."""
-    return str(path).encode("utf-8", "backslashreplace").decode()
-
-
 def compute_change_mark(folder: Path, file: str = "") -> tuple[int, ...]:
     """Return a mark that changes with machine.toml, the journal, the names in taps/, foreign files, and one more."""
     stats = []

@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,8 @@ def rebuild_files(path: Path) -> list[str]:
             report.append(f"{JOURNAL_NAME}: rewritten with {len(reading.entries) + len(fresh)} lines")
             report += _report_missing_lines(reading.entries, len(fresh))
         report += [f"{entry.file}: entered in the journal" for entry in fresh]
-        report += [*_give_up_lines(journal), *_record_lost_taps(path, journal)]
+        report += [*_exclude_repeated_recordings(journal), *_give_up_lines(journal)]
+        report += _record_lost_taps(path, journal)
         report += _repair_cut_recordings(path, journal)
         report += [*_restore_machine_file(path), *_repair_devices_file(path)]
     return report
@@ -133,6 +135,19 @@ def _list_h5_files(folder: Path, place: str) -> list[Path]:
     paths = sorted((folder / place).iterdir()) if (folder / place).is_dir() else []
     named = (path for path in paths if path.is_file() and not path.name.startswith("."))
     return [path for path in named if path.suffix == ".h5" or is_hdf5_file(path)]
+
+
+def _exclude_repeated_recordings(journal: Journal) -> Iterator[str]:
+    """Exclude tap tests of recordings that two computers replayed, all but the first by identity, and report them."""
+    kept = dict[tuple[str, str], str]()
+    taps = journal_entries.read_committed_taps(journal.read()).values()
+    replayed = (tap for tap in taps if tap.source_sha256 and not tap.excluded)
+    for tap in sorted(replayed, key=attrgetter("id")):
+        first = kept.setdefault((tap.source_sha256, tap.direction), tap.id)
+        if first != tap.id:
+            reason = f"same recording as {first}"
+            journal.append(make_entry("exclude", tap=tap.id, reason=reason))
+            yield f"{tap.file}: excluded, {reason}"
 
 
 def _give_up_lines(journal: Journal) -> Iterator[str]:

@@ -18,7 +18,12 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_lock import LOCK_HOLDER_NAME, LOCK_NAME
 from lobewatch.machine.journal import journal
 from lobewatch.machine.journal import read_entries as journal_entries
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, DAMAGED_FOLDER_NAME, LOBEWATCH_FILES
+from lobewatch.machine.journal.file_names import (
+    CONFLICTS_FOLDER_NAME,
+    DAMAGED_FOLDER_NAME,
+    LOBEWATCH_FILES,
+    format_path,
+)
 from lobewatch.machine.journal.journal import Journal, JournalReading, format_command
 from lobewatch.machine.journal.sync_conflicts import list_sync_remarks
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -208,7 +213,7 @@ def _verify_names(folder: Path, named: Collection[str]) -> Iterator[Remark]:
     }
     known["history.h5"] = "old cache, or an exported history", DELETION_ADVICE
     for path in sorted(folder.iterdir()):
-        if path.name in named:
+        if format_path(path.name) in named:
             continue
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name in (DAMAGED_FOLDER_NAME, CONFLICTS_FOLDER_NAME):
             yield Remark("set-aside", path.name, "file left over, or set aside by lobewatch", DELETION_ADVICE)
@@ -216,7 +221,7 @@ def _verify_names(folder: Path, named: Collection[str]) -> Iterator[Remark]:
             yield Remark("not-verified", path.name, *known.get(path.name, ("not a file of lobewatch",)))
     taps, files = folder / "taps", {*contents.list_tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
-        if path not in files and f"taps/{path.name}" not in named:
+        if path not in files and f"taps/{format_path(path.name)}" not in named:
             yield Remark("not-verified", f"taps/{path.name}", "not a tap file", "Remove the file from taps/")
 
 

@@ -16,6 +16,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.program_case import ProgramCase
 from lobewatch.verdicts.speed_drop import NO_DROP, SpeedDrop
 from lobewatch.verdicts.uncertainty import Factors, Uncertainty, scale_fields
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch, is_force_constant
 
 N_PROGRAM_SAMPLES = 300
 """Number of samples: if all are stable, at most 1 % of the uncertainty chatters at 95 % confidence."""
@@ -101,6 +102,9 @@ class ProgramSamples:
             here = np.flatnonzero(np.isin(cut, alike))
             if here.size:
                 rows = replace(self.rows[row[here]], cut=self.cuts[alike[0]], feed_angle=angles[cut[here]])
+                if np.any(rows.process_damping) and is_force_constant(rows.cut):
+                    grown[here] = _log_depth_ratio(rows, depths[here])
+                    continue
                 number = self.piece_factor * lobes.count_pieces(rows, float(np.max(depths)), COARSE_CYCLES_PER_PIECE)
                 grown[here] = lobes.growth_rate(rows, depths[here], number)
         return grown
@@ -159,6 +163,20 @@ class ProgramSamples:
         n, f, k, push = (np.repeat(factor, len(self.rows)) for factor in factors)
         rows = scale_fields(rows, frequency=f[:, np.newaxis], stiffness=k[:, np.newaxis])
         return replace(self, rows=scale_fields(rows, speed_rpm=n, tangential=push, radial=push))
+
+
+DISTINGUISHED_LIMIT_RATIO = 2.0
+"""Largest limit over the deepest checked depth that is told apart; chosen."""
+
+
+def _log_depth_ratio(rows: MillingRows, depths: Floats) -> Floats:
+    """Return the logarithm of depths (r, d) in m over the limit, in place of growth; negative for a stable cut.
+
+    Exact for a constant force. With process damping it takes a small part of the time of multipliers, which crowd.
+    """
+    deepest = DISTINGUISHED_LIMIT_RATIO * float(np.max(depths))
+    limits, _ = ZeroOrderBatch.of(rows).limits(rows.speed_rpm[:, np.newaxis], deepest)
+    return np.asarray(np.log(depths / np.minimum(limits, deepest)))
 
 
 CRITICAL_DEPTH_SHARES = np.array([0.4, 0.6, 0.8, 1.0])

@@ -29,7 +29,7 @@ MAX_MODE_PHASE = np.radians(89)
 WEAR_FACTORS: Mapping[ToolWear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients by tool wear; chosen."""
 WORN_LAND_UM = 300.0
-"""Width of the wear land of a worn edge: end of tool life by uniform flank wear in ISO 8688-2 (um)."""
+"""Width of the wear land of a worn edge (um): assumed, as the end of tool life quoted from ISO 8688-2."""
 
 
 RecordT = TypeVar("RecordT", MillingRows, Mode)
@@ -105,8 +105,8 @@ class Uncertainty:
     ratio: FactorRange
     """Range of Kr/Kt, the direction of the force, over the median."""
     wear: float = 1.0
-    """Largest factor on both cutting coefficients by edges that are no longer new; the least is 1. Drawn with the
-    largest Kt, and apart from it for a listed material, whose sources are of sharp edges."""
+    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the
+    least is 1."""
     axes: PrincipalDirections | None = None
     """Principal directions of the modes and their open signs; None if they are known."""
     learned: LearnedSamples | None = None
@@ -166,10 +166,9 @@ class Uncertainty:
             rows = replace(rows, vector=self.axes.sample(count, seed))
         if self.wear == 1 or without == causes.WEAR.name:
             return rows
-        worn, order = np.linspace(1, self.wear, count), np.arange(count)
-        if self.joint is None:
-            order[np.argsort(rows.tangential, kind="stable")] = np.arange(count)
-        return scale_fields(rows, tangential=worn[order], radial=worn[order])
+        worn = np.empty(count)
+        worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
+        return scale_fields(rows, tangential=worn, radial=worn)
 
     def _sample_modes(self, rows: MillingRows, random: np.random.Generator, seed: int, without: str) -> MillingRows:
         phases = np.random.default_rng((seed, 1))

@@ -60,6 +60,8 @@ MAX_BATCH_NUMBERS = 300_000
 """Largest number of values computed at once."""
 SPEEDS_PER_FREQUENCY_GRID = 10
 """Number of neighbouring speeds with process damping that share their frequencies."""
+DAMPED_SPINDLES_AT_ONCE = 100
+"""Number of spindles with process damping computed at once, for the processor cache; measured."""
 NEWTON_STEPS = 14
 """Number of Newton steps for a root."""
 CONSTANT_FORCE_TOLERANCE = 1e-6
@@ -102,8 +104,10 @@ class ZeroOrderBatch:
         depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
         undamped = self.rows.process_damping == 0
         if not np.all(undamped):
-            spindles = ZeroOrderBatch(self.rows[~undamped], self.force[~undamped])
-            depth[~undamped], chatter[~undamped] = spindles._damped_limits(speeds[~undamped], deepest)
+            damped = np.flatnonzero(~undamped)
+            for few in np.array_split(damped, -(-damped.size // DAMPED_SPINDLES_AT_ONCE)):
+                spindles = ZeroOrderBatch(self.rows[few], self.force[few])
+                depth[few], chatter[few] = spindles._damped_limits(speeds[few], deepest)
             if np.any(undamped):
                 depth[undamped], chatter[undamped] = self[undamped].limits(speeds[undamped], deepest)
             return depth, chatter
@@ -123,7 +127,7 @@ class ZeroOrderBatch:
             xy = self._receptance(omega, 0, 1) if self._is_rotated else np.zeros((1, 1), np.complex128)
             return self._receptance(omega, 0, 0), self._receptance(omega, 1, 1), xy
 
-        loop, near = DampedLoop(cut, self.force, self.damping, receptances), self._frequency_grid()
+        loop, near = DampedLoop(cut, self.force, self.damping, receptances, self._jump), self._frequency_grid()
         reach = self._damped_range(near, receptances(near), teeth, deepest)
         order = np.argsort(np.min(teeth, axis=0))
         depth, chatter = np.empty((2, *teeth.shape))
@@ -218,6 +222,15 @@ class ZeroOrderBatch:
         return 1 + trace + product * flexible, dtrace + dproduct * flexible + product * (
             dx * gy + gx * dy - 2 * gxy * dxy
         )
+
+    @property
+    def _jump(self) -> Floats:
+        """Velocity of the tip by which complex modes answer a force at once (m/s/N), shape (r, 2, 2)."""
+        axes, jump = self.rows.axes, np.zeros((len(self.rows), 2, 2))
+        share = self.rows.tip_participation[1] * self.rows.frequency / self.rows.stiffness
+        vector = self.rows.vector
+        jump[:, axes[:, np.newaxis], axes] = np.einsum("rn,rnp,rnq->rpq", share, vector, vector)
+        return jump
 
     @property
     def _is_rotated(self) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.subprocess_guard import run_in_subprocess
+from acquisition.subprocess_guard import SubprocessService, run_in_subprocess
 
 
 @pytest.fixture
@@ -57,3 +57,25 @@ def test_one_that_waits_for_ever_is_ended(program: Path) -> None:
     program.write_text("import time\ntime.sleep(600)")
     with pytest.raises(subprocess.TimeoutExpired):
         run_in_subprocess("told_apart", patience=0.5)
+
+
+def test_a_service_works_on_many_requests_and_starts_again_after_a_crash_or_a_hang(
+    program: Path, tmp_path: Path
+) -> None:
+    program.write_text(
+        "import os, time\nfrom pathlib import Path\nfrom acquisition.subprocess_guard import read_requests\n"
+        "for name in read_requests():\n"
+        "    name == 'crash' and os.abort()\n"
+        "    name == 'hang' and time.sleep(600)\n"
+        "    Path(name).write_text(str(os.getpid()))\n"
+    )
+    service, files = SubprocessService("told_apart"), [tmp_path / f"line\nbreak-{number}" for number in range(4)]
+    service.request(str(files[0]))
+    service.request(str(files[1]))
+    for word, patience in (("crash", 60.0), ("hang", 0.3)):
+        with pytest.raises(subprocess.SubprocessError):
+            service.request(word, patience)
+    service.request(str(files[2]))
+    service.close()
+    first, second, third = (path.read_text() for path in files[:3])
+    assert first == second != third

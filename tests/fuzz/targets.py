@@ -286,6 +286,6 @@ TARGETS = (
     Target("journal", journals, check_journal, 70),
     Target("bridge", streams, check_bridge, 250),
     Target("lines", partial(edited, LINE_SEEDS), check_lines, 500),
-    Target("tap", partial(edited, TAP_SEEDS), check_tap, 12),
+    Target("tap", partial(edited, TAP_SEEDS), check_tap, 200),
 )
 """All readers."""

@@ -131,3 +131,21 @@ def test_only_the_surface_speed_counts() -> None:
 def test_a_coefficient_that_is_none_is_rejected(value: float) -> None:
     with pytest.raises(ValueError, match="process_damping"):
         replace(SLOT, process_damping=value)
+
+
+def random_slot(seed: int) -> tuple[list[Mode], list[Mode], Cut, float]:
+    """Return complex modes in x and y, a slot of constant force with process damping, and its speed (rpm)."""
+    rng = np.random.default_rng(seed)
+    x, y = ([Mode(rng.uniform(700, 2500), rng.uniform(0.015, 0.05), 3e7, phase_deg=rng.uniform(-15, 15))] for _ in "xy")
+    kt, kr, c = rng.uniform(0.7e9, 2.5e9), rng.uniform(0.1e9, 1e9), rng.uniform(1e6, 2e7)
+    cut = Cut(4, 1.0, "down", kt, kr, feed_angle=rng.uniform(0, 3), process_damping=c)
+    return x, y, cut, 60 * 1500 / (4 * rng.uniform(8, 20))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_zero_order_is_exact_for_a_constant_force_with_complex_modes_at_high_lobes(seed: int) -> None:
+    x, y, cut, speed = random_slot(seed)
+    exact = stability_boundary(x, y, cut, [speed], 0.03).depth
+    rows = rows_at_speeds(build_milling_system(x, y), cut, np.array([speed]))
+    limit = ZeroOrderBatch.of(rows).limits(np.array([speed]), 0.06)[0][:, 0]
+    assert np.minimum(limit, 0.03) == pytest.approx(np.minimum(exact, 0.03), rel=1e-4)

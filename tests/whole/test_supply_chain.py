@@ -7,9 +7,11 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
 ROOT = Path(__file__).parents[2]
 SUPPLY_CHAIN_FILES = (
@@ -107,3 +109,9 @@ def test_setuptools_is_new_enough_where_it_is_named() -> None:
     for path in (ROOT / "pyproject.toml", ROOT / "CONTRIBUTING.md", *ROOT.glob("[et]*/*/**/pyproject.toml")):
         for bound in re.findall(r'"setuptools([^."]*[\d.]*)"', path.read_text(encoding="utf-8")):
             assert bound == ">=78.1.1", path
+
+
+def test_each_advisory_has_its_source_and_does_not_affect_the_version_that_mends_it() -> None:
+    for entry in tomllib.loads((ROOT / ".ci" / "advisories.toml").read_text(encoding="utf-8"))["advisory"]:
+        assert re.search(r"GHSA-\w{4}-\w{4}-\w{4}|PYSEC-\d{4}-\d+|changelog|CVE record", entry["source"]), entry
+        assert not SpecifierSet(entry["affected"]).contains(entry["fixed"]), entry

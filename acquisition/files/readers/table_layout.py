@@ -23,11 +23,11 @@ A hit has no fewer samples, and notes have fewer rows. A few short rows at the e
 """
 BLANK_SEPARATOR = "[ \t]+"
 """Separator of words between blanks; none of them can be empty."""
-_UNSIGNED_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_UNSIGNED_NUMBER = r"(?:\d++\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _COMPLEX_PAIR = re.compile(rf"\(\s*([+-]?{_UNSIGNED_NUMBER})\s*,\s*([+-]?{_UNSIGNED_NUMBER})\s*\)")
 _COMMA_OR_POINT_NUMBER = _UNSIGNED_NUMBER.replace(r"\.", "[.,]")
 """Pattern of a number with a decimal point or comma."""
-_COMPLEX_SUM = re.compile(rf"({_COMMA_OR_POINT_NUMBER})\s*([+-])\s*({_COMMA_OR_POINT_NUMBER})\s*[ij]\b")
+_COMPLEX_SUM = re.compile(rf"(?<!\d)({_COMMA_OR_POINT_NUMBER})\s*([+-])\s*({_COMMA_OR_POINT_NUMBER})\s*[ij]\b")
 _TIMESTAMP = re.compile(r"\d{1,4}([-/.:])\d{1,2}\1\d{1,4}")
 _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
 

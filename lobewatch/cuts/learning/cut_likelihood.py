@@ -105,8 +105,8 @@ class CutEvidence:
         return math.exp(-(((self.frequency_ratio - 1) / AGED_FREQUENCY_CHANGE) ** 2) / 2)
 
     def is_repeat_of(self, other: "CutEvidence") -> bool:
-        """Return whether another cut repeats this one: same program, material, speed and depth."""
-        near = abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
+        """Return whether another cut repeats this one, with a verdict: same program, material, speed and depth."""
+        near = other.has_verdict and abs(math.log(other.speed_rpm / self.speed_rpm)) < REPEAT_SPEED_TOLERANCE
         same = (self.cut, self.material, self.feed_angles) == (other.cut, other.material, other.feed_angles)
         return near and same and abs(math.log(other.depth / self.depth)) < REPEAT_DEPTH_TOLERANCE
 

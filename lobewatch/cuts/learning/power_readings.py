@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 
 from acquisition import Remark
+from lobewatch.cuts.learning.cut_likelihood import estimate_force_by_power
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.journal.entries import CutEntry, geometry_key, material_key
 from lobewatch.machine.settings.drive_power import predict_power
@@ -59,7 +60,7 @@ def find_reading_remarks(entry: CutEntry, machine: Machine, earlier: Sequence[Cu
         return
     same = [old for old in earlier if old.is_evidence and old.power and _program_key(old) == _program_key(entry)]
     usual = median(map(_force_by_power, same)) if same else 1.0
-    change, force = _force_by_power(entry) / usual, _force_by_power(entry)
+    change = _force_by_power(entry) / usual
     if max(change, 1 / change) > MAX_PROGRAM_CHANGE:
         exclude = f"then exclude {entry.id} with folder_updates.exclude_entry"
         others = [table.name for table in machine.program if _is_power_of(entry, table, machine, usual)]
@@ -70,6 +71,7 @@ def find_reading_remarks(entry: CutEntry, machine: Machine, earlier: Sequence[Cu
             text = f"the power is {change:.2g} times that of earlier readings of this program"
             cure = f"Check the power in air, the feed and the edges. After a wrong reading, {exclude}."
             yield Remark("power-changed", entry.id, text, cure)
+    force = estimate_force_by_power(entry.power, entry.cut, entry.has_chatter).force
     if is_off_by_two(force):
         yield make_material_remark(entry.id, force)
 

@@ -104,11 +104,13 @@ class SpindleSamples:
         return values
 
     def force_factors(self, material: int) -> Floats:
-        """Return the factors of Kt of a material, shape (r,)."""
+        """Return the factors of Kt of a material, with the largest wear for the largest Kt, shape (r,)."""
         mean, spread = ROTATING_FORCE_PRIOR[0], program_samples.force_spread(self.uncertainty)
         at_speed = 1 + spread * self.normal[:, self._material_index(material)]
-        force, _ = self.uncertainty.coefficient_factors(self._coefficient_shares(material))
-        return np.asarray(mean * np.maximum(at_speed, program_samples.MIN_ROTATING_FACTOR) * force)
+        shares = self._coefficient_shares(material)
+        force, _ = self.uncertainty.coefficient_factors(shares)
+        worn = 1 + (self.uncertainty.wear - 1) * shares[0]
+        return np.asarray(mean * np.maximum(at_speed, program_samples.MIN_ROTATING_FACTOR) * force * worn)
 
     def process_damping(self, material: int) -> Floats:
         """Return the process damping coefficients C of a material (N/m), shape (r,)."""

@@ -8,11 +8,13 @@ from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable
 
 MAX_PROCESS_DAMPING = 5e5
-"""Largest C of a material of unknown C (N/m): published values are 0 to 5e5."""
+"""Largest C of a material of unknown C (N/m): assumed, as the range that published values are said to have."""
 ABSENT_SHARE = 0.5
 """Share of samples with the lowest C, which is 0 if nothing is known; chosen. So cuts must teach it."""
 INDENTATION_STIFFNESS = 3e13
-"""Force over the volume that a flank indents (N/m^3), the lowest published: Ti-6Al-4V; steel 4e13, aluminium 1.5e14."""
+"""Force over the volume that a flank indents (N/m^3), assumed: values as quoted for Ti-6Al-4V, not checked in a source.
+
+Larger ones are quoted for steel (4e13) and aluminium (1.5e14)."""
 
 
 class ProcessDamping(NamedTuple):

@@ -18,9 +18,16 @@ LOBEWATCH_FILES = {JOURNAL_NAME, JOURNAL_COPY_NAME, "machine.toml", "taps", "cut
 LOBEWATCH_FILES |= {"history.rows", "daq.json", "standing.json", "told.json", "unsent.json"}
 """Files and folders in a machine folder that are verified, or made again if they are deleted."""
 _OWN_NAMES = LOBEWATCH_FILES | {"report.html", "history.h5", DAMAGED_FOLDER_NAME, CONFLICTS_FOLDER_NAME}
-_OTHER_OWN_NAME = re.compile(r"\..*|.*\.tmp|journal(\.copy)?\.jsonl\.\d+\.(torn|damaged)", re.DOTALL)
-"""Hidden and temporary files, and those that lobewatch has set aside."""
+_OTHER_OWN_NAME = re.compile(
+    r"\.lock(\.holder)?|\..*\.[0-9a-f]{8}\.tmp|journal(\.copy)?\.jsonl\.\d+\.(torn|damaged)", re.DOTALL
+)
+"""Lock, half-written files, and files that lobewatch has set aside."""
 _OWN_NAMES_BELOW = {"taps": re.compile(r"\..*|.*\.(h5|tmp)", re.DOTALL), "cuts": re.compile(r"\..*|c\d+\.h5|.*\.tmp")}
+
+
+def format_path(path: Path | str) -> str:
+    """Return a path as valid UTF-8, with invalid bytes escaped."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
 
 
 def list_foreign_names(folder: Path | str) -> list[str]:

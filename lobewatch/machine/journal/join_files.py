@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition import read_tap, write_tap
 from acquisition.errors import join_sentences
 from acquisition.file_io import read_regular_file
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, move_aside
+from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, format_path, move_aside
 from lobewatch.machine.journal.join_lines import compute_fact_mark, join_lines
 from lobewatch.machine.journal.journal import Journal, JournalEntry, JournalReading
 from lobewatch.machine.journal.sync_conflicts import ConflictFile, find_conflict_files
@@ -30,32 +30,32 @@ def join_conflict_files(folder: Path, journal: Journal) -> Iterator[str]:
         if file.kind == "journal":
             yield from _join_journal(folder, journal, file)
         elif file.kind == "settings":
-            yield f"{file.name}: {file.finding}"
+            yield f"{format_path(file.name)}: {file.finding}"
             yield _set_conflict_aside(folder, file)
 
 
 def _join_journal(folder: Path, journal: Journal, file: ConflictFile) -> Iterator[str]:
-    own, other = journal.read().entries, JournalReading(file.lines, ())
+    own, other, name = journal.read().entries, JournalReading(file.lines, ()), format_path(file.name)
     known = {compute_fact_mark(entry) for entry in own}
     faults = [fault for fault in other.faults if compute_fact_mark(other.entries[fault.number - 1]) not in known]
     for fault in (fault for fault in faults if fault.is_newer):
-        yield join_sentences(f"{file.name}: not joined, because {fault}", "Update lobewatch, then run rebuild again")
+        yield join_sentences(f"{name}: not joined, because {fault}", "Update lobewatch, then run rebuild again")
         return
     unusable = {fault.number for fault in faults if not fault.is_used}
     usable = [entry for number, entry in enumerate(other.entries, 1) if number not in unusable]
-    joined = join_lines(own, usable, file.name)
+    joined = join_lines(own, usable, name)
     entries = [_rename_tap(folder, entry, {*joined.renumbered.values()}) for entry in joined.entries]
     if entries:
         journal.append(*entries)
-    yield f"{file.name}: {joined.n_new} new line{'' if joined.n_new == 1 else 's'} joined to the journal"
-    yield from (f"{file.name}: {fault}, so it is not joined" for fault in faults)
-    yield from (f"{file.name}: its {old} is now {new}" for old, new in joined.renumbered.items())
+    yield f"{name}: {joined.n_new} new line{'' if joined.n_new == 1 else 's'} joined to the journal"
+    yield from (f"{name}: {fault}, so it is not joined" for fault in faults)
+    yield from (f"{name}: its {old} is now {new}" for old, new in joined.renumbered.items())
     yield _set_conflict_aside(folder, file)
 
 
 def _set_conflict_aside(folder: Path, file: ConflictFile) -> str:
     aside = move_aside(folder, folder / file.name, CONFLICTS_FOLDER_NAME)
-    return f"{file.name}: moved to {aside.relative_to(folder).as_posix()}"
+    return f"{format_path(file.name)}: moved to {format_path(aside.relative_to(folder).as_posix())}"
 
 
 def _rename_tap(folder: Path, entry: JournalEntry, new_names: set[str]) -> JournalEntry:

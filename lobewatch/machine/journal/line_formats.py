@@ -5,7 +5,7 @@ A line carries the number of its format. Lines of a newer version are kept and n
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Annotated, Any, NamedTuple
 
@@ -19,7 +19,10 @@ from lobewatch.machine.journal.tap_entry import TAP_LINE_PREFIX, TapEntry
 from modal import ModeEdits
 
 JOURNAL_FORMAT = 2
-"""Number of the newest format, raised with every new kind or field. 1: lines without a number. 2: kind "join"."""
+"""Number of the newest format, raised with every new kind, field or value.
+
+1: lines without a number. 2: kind "join", test cuts by the "display" of the drive.
+"""
 FORMAT_KEY, JOINED_KEY = "format", "joined"
 """Keys of the number of the format, and of the mark of the line of another computer that a line was joined from."""
 BATCH_KEY = "batch"
@@ -107,17 +110,17 @@ class JoinEntry(msgspec.Struct, frozen=True):
     """Contradictions between the two journals."""
 
 
-def _convert(*types: type) -> Callable[[Mapping[str, Any]], object]:
+def _convert(*types: type) -> Callable[[Mapping[str, Any]], Sequence[object]]:
     return lambda line: [msgspec.convert(line, kind) for kind in types]
 
 
-def _read_cut(line: Mapping[str, Any]) -> object:
+def _read_cut(line: Mapping[str, Any]) -> Sequence[object]:
     return msgspec.convert(line, CutEntry), parse_cut_line(line)
 
 
 class _LineKind(NamedTuple):
     types: tuple[type, ...]
-    read: Callable[[Mapping[str, Any]], object]
+    read: Callable[[Mapping[str, Any]], Sequence[object]]
 
     @property
     def fields(self) -> set[str]:
@@ -156,11 +159,13 @@ LINE_KINDS = {
 
 
 def _make_tap_line(*, accepts_others: bool) -> type:
-    """Make the type of a whole line of a tap test; accepts_others: True to accept unknown fields."""
+    """Make the type of a whole line of a tap test; accepts_others: True to accept unknown fields and newer formats."""
     strict: dict[str, Any] = {"time": ZonedTime, "direction": TapDirection}
-    fields = [_field_of(field, strict) for field in msgspec.structs.fields(TapEntry)]
-    names = {name for name, *_ in fields}
-    fields += [_field_of(field, {}) for field in msgspec.structs.fields(LineFrame) if field.name not in names]
+    strict |= {} if accepts_others else {FORMAT_KEY: Annotated[int, msgspec.Meta(le=JOURNAL_FORMAT)]}
+    own = msgspec.structs.fields(TapEntry)
+    names = {field.name for field in own}
+    others = [field for field in msgspec.structs.fields(LineFrame) if field.name not in names]
+    fields = [_field_of(field, strict) for field in (*own, *others)]
     return msgspec.defstruct("_TapLine", fields, forbid_unknown_fields=not accepts_others, kw_only=True, gc=False)
 
 
@@ -231,14 +236,29 @@ def _find_line_fault(number: int, line: bytes) -> LineFault | None:
     try:
         msgspec.json.decode(line)  # accepts no infinite number
         msgspec.convert(entry, LineFrame)
-        _refuse_local_times(kind.read(entry))
+        read = kind.read(entry)
+        _refuse_local_times(read)
     except (ValueError, TypeError, LookupError, AttributeError) as error:
         return LineFault(number, f"{name}: {_explain(error)}", written, is_used=False)
-    unknown = ", ".join(sorted(entry.keys() - kind.fields))
+    understood: dict[str, Any] = dict.fromkeys(kind.fields)
+    for one in read:
+        understood |= msgspec.to_builtins(one)
+    unknown = ", ".join(sorted(_find_unknown_fields(entry, understood)))
     return LineFault(number, f"{name}: unknown field {unknown}", written, is_used=True) if unknown else None
 
 
-def _refuse_local_times(values: object) -> None:
+def _find_unknown_fields(written: object, understood: object, place: str = "") -> Iterator[str]:
+    """Yield the fields of a line, also of tables in it, that are not among those that were understood."""
+    if isinstance(written, dict) and isinstance(understood, dict):
+        yield from (f"{place}{key}" for key in written.keys() - understood.keys())
+        for key in written.keys() & understood.keys():
+            yield from _find_unknown_fields(written[key], understood[key], f"{place}{key}.")
+    elif isinstance(written, list) and isinstance(understood, list):
+        for pair in zip(written, understood, strict=False):
+            yield from _find_unknown_fields(*pair, place)
+
+
+def _refuse_local_times(values: Iterable[object]) -> None:
     for value in values if isinstance(values, list) else ():
         for name in _field_names(type(value)):
             time = getattr(value, name)

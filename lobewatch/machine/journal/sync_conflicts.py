@@ -14,7 +14,7 @@ from typing import Any, Literal
 from acquisition import Remark
 from acquisition.file_io import open_regular_file
 from acquisition.files.hdf5_file import HDF5_SIGNATURE
-from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, JOURNAL_NAME, list_foreign_files
+from lobewatch.machine.journal.file_names import CONFLICTS_FOLDER_NAME, JOURNAL_NAME, format_path, list_foreign_files
 from lobewatch.machine.journal.join_lines import compute_fact_mark, find_open_contradictions
 from lobewatch.machine.journal.journal import (
     PREVIOUS_DIGEST_KEY,
@@ -94,7 +94,7 @@ def conflict_remark(folder: Path, name: str, finding: str) -> Remark:
         Content that the file of lobewatch lacks.
     """
     cure = f"Run {format_command('rebuild', folder)} to join the files of both computers"
-    return Remark("sync-conflict", name, finding, cure)
+    return Remark("sync-conflict", format_path(name), finding, cure)
 
 
 def _inspect(folder: Path, name: str, reading: JournalReading) -> ConflictFile | None:
@@ -223,8 +223,8 @@ def _list_contradictions(folder: Path, reading: JournalReading) -> Iterator[Rema
             differences = list_setting_differences(folder, name)
         except (OSError, ValueError, LookupError, AttributeError):
             continue
-        cure = f"Correct machine.toml, or delete {name} to keep machine.toml"
-        yield from (Remark("sync-contradiction", name, text, cure) for text in differences)
+        cure = f"Correct machine.toml, or delete {format_path(name)} to keep machine.toml"
+        yield from (Remark("sync-contradiction", format_path(name), text, cure) for text in differences)
 
 
 COMMANDS_BY_KIND = {"exclude": "exclude", "include": "include", "modes": "modes", "hit": "modes", "ack": "ack"}

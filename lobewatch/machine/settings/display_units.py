@@ -4,13 +4,13 @@ JSON, CSV and machine.toml stay in the units that their keys name.
 """
 
 import math
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from lobewatch.machine.settings.toml import parse_toml_tables, read_toml_text
 from lobewatch.machine.settings.unit_text import FEED_UNITS, INCH_MM, SPEED_UNITS
 
 UnitSystem = Literal["metric", "inch"]
@@ -115,8 +115,8 @@ def metric_output() -> Iterator[None]:
 def read_units(folder: Path) -> UnitSystem:
     """Read the units of a machine folder; metric if there is no sound machine.toml."""
     try:
-        text = (folder / "machine.toml").read_bytes()
-        units = tomllib.loads(text.decode("utf-8-sig"))["machine"]["units"] if b"units" in text else "metric"
+        text = read_toml_text(folder / "machine.toml")
+        units = parse_toml_tables(text)["machine"]["units"] if "units" in text else "metric"
     except (OSError, ValueError, LookupError, TypeError):
         return "metric"
     return "inch" if units == "inch" else "metric"

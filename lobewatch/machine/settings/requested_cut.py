@@ -70,9 +70,11 @@ def find_cut_setting(
     power_kw is the power shown in the cut less that in air. Raises ValueError for an unknown name or an invalid value.
     """
     table = find_by_name(machine.cut_tables, program)
-    for name, key, value, unit in (("speed", "speed_rpm", speed_rpm, "rpm"), ("depth", "depth_mm", depth_mm, "mm")):
-        if value is not None and not _is_positive(value):
-            raise ValueError(f"ProgramTable.{key} {value:g} is not above 0. Give the {name} of the cut in {unit}.")
+    if speed_rpm is not None and not _is_positive(speed_rpm):
+        raise ValueError(f"ProgramTable.speed_rpm {speed_rpm:g} is not above 0. Give the speed of the cut in rpm.")
+    if depth_mm is not None and not _is_positive(depth_mm):
+        cure = f"Give the depth of the cut in {LENGTH.unit}."
+        raise ValueError(f"ProgramTable.depth_mm {LENGTH.number(depth_mm, 'g')} is not above 0. {cure}")
     preset = table if isinstance(table, ProgramTable) else None
     speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
     depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
@@ -80,7 +82,9 @@ def find_cut_setting(
         missing = f"ProgramTable.{'speed_rpm' if speed is None else 'depth_mm'}"
         raise ValueError(f"{missing} is missing. Give this value, because the {REFERENCE_CUT} has no default for it.")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
-        raise ValueError(f"ProgramTable.depth_mm {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
+        raise ValueError(
+            f"ProgramTable.depth_mm {LENGTH.text(depth)} is deeper than flute_length_mm={table.flute_length_mm:g}"
+        )
     program_name, tool = (preset.name, preset.tool) if preset else (None, machine.tap.tool)
     material, cut = machine.coefficients(table).material, machine.build_cut(table)
     setting = CutSetting(table, material, program_name, tool, cut, table.feed, float(speed), depth / 1e3)
@@ -170,7 +174,8 @@ def build_cut_without_setting(machine: Machine, values: Mapping[str, Any]) -> Op
     deepest, depth = table.deepest_mm, values.get("depth_mm")
     if depth is not None and depth > deepest:
         of = "the flutes" if table.flute_length_mm else "one diameter, the limit without flute_length_mm"
-        raise ValueError(f"ProgramTable.depth_mm {depth:g} is deeper than {of}. Give up to {LENGTH.text(deepest)}.")
+        text = f"ProgramTable.depth_mm {LENGTH.number(depth, 'g')} is deeper than {of}"
+        raise ValueError(f"{text}. Give up to {LENGTH.text(deepest)}.")
     return OpenCut(table, direction is None, bool(reference))
 
 

@@ -11,6 +11,7 @@ import msgspec
 from acquisition import Remark
 from lobes import fold_material_name
 from lobewatch.machine.settings.cut_tables import CutTable, MaterialTable, ProgramTable
+from lobewatch.machine.settings.display_units import CUTTING_SPEED, LENGTH
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.machine.settings.spindle_tables import MassTable, SpindleTable, ToolTable
 from lobewatch.machine.settings.toml import TomlTable, find_plausible_ranges
@@ -40,7 +41,7 @@ FLUTE_LENGTH_RATIO_RANGE = RatioRange(0.2, 15.0)
 """Flute length over diameter."""
 RADIAL_DEPTH_RATIO_RANGE = RatioRange(0.005, 1.0)
 """Radial depth of cut ae over diameter."""
-CUTTING_SPEED_RANGE = RatioRange(3.0, 6000.0, "m/min at the edge")
+CUTTING_SPEED_RANGE = RatioRange(3.0, 6000.0)
 """Cutting speed (m/min), as a ratio to 1 m/min."""
 GYRATION_RADIUS_RANGE = RatioRange(5.0, 500.0, "mm radius of gyration")
 """Radius of gyration of a lumped mass (mm), as a ratio to 1 mm."""
@@ -166,7 +167,7 @@ def _check_program(machine: Machine, program: ProgramTable) -> Iterator[Implausi
         yield from _check_program_tool(program, tool, place)
     if program.tool == machine.tap.tool and machine.tap.stick_out_mm is not None:
         diameter = program.tool_diameter_mm
-        limits = STICK_OUT_RATIO_RANGE._replace(unit=f"diameters of {diameter:g} mm")
+        limits = STICK_OUT_RATIO_RANGE._replace(unit=f"diameters of {LENGTH.text(diameter)}")
         yield from _check_ratio("[tap]", "stick_out_mm", machine.tap.stick_out_mm, diameter, limits)
 
 
@@ -195,9 +196,10 @@ def _check_cut(cut: CutTable, place: str) -> Iterator[ImplausibleSetting]:
         yield from _check_ratio(place, "flute_length_mm", cut.flute_length_mm, diameter, FLUTE_LENGTH_RATIO_RANGE)
     if isinstance(cut, ProgramTable):
         yield from _check_ratio(place, "depth_mm", cut.depth_mm, diameter, DEPTH_RATIO_RANGE)
-        speed = math.pi * diameter / 1000 * cut.speed_rpm
-        rpm_per_speed = cut.speed_rpm / speed
-        yield from _check_ratio(place, "speed_rpm", cut.speed_rpm, rpm_per_speed, CUTTING_SPEED_RANGE)
+        scale, (low, high, _) = CUTTING_SPEED.scale, CUTTING_SPEED_RANGE
+        speed = math.pi * diameter / 1000 * cut.speed_rpm * scale
+        limits = RatioRange(low * scale, high * scale, f"{CUTTING_SPEED.unit} at the edge")
+        yield from _check_ratio(place, "speed_rpm", cut.speed_rpm, cut.speed_rpm / speed, limits)
 
 
 def _check_radial_coefficient(table: CutTable | MaterialTable, place: str) -> Iterator[ImplausibleSetting]:

@@ -90,7 +90,8 @@ def server_name(address: str) -> str:
         settings = conninfo_to_dict(address) if address.startswith(("postgresql://", "postgres://")) else {}
     except ProgrammingError:  # its text may hold the password
         settings = {}
-    if not settings:
+    ports = str(settings.get("port", "")).replace(",", "")
+    if not settings or (ports and not ports.isdecimal()):  # a password without "@HOST" is read as the port
         cure = "Use postgresql://USER@HOST:PORT/DATABASE, with the password in PGPASSWORD or ~/.pgpass."
         raise DataError(f"--to: invalid PostgreSQL address. {cure}")
     return f"{settings.get('host', '')}:{settings.get('port', 5432)}/{settings.get('dbname', '')}"

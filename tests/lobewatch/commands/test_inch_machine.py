@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,18 @@ from typing import Any
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from typer.testing import Result
 
-from lobewatch.machine.settings.display_units import FEED_PER_TOOTH, FEED_RATE, LENGTH, REMOVAL_RATE, shown_units
+from lobewatch.machine.settings.display_units import (
+    FEED_PER_TOOTH,
+    FEED_RATE,
+    LENGTH,
+    REMOVAL_RATE,
+    read_units,
+    shown_units,
+)
+from lobewatch.machine.settings.setting_questions import find_program_questions
 from lobewatch.machine.setup_questions.draft import MachineDraft
 from lobewatch.machine.setup_questions.questions import find_setup_question
 from tests.lobewatch.commands.invoke import invoke
@@ -95,6 +105,38 @@ def test_the_report_is_in_inches(inch: Shop) -> None:
     page = (inch.path / "report.html").read_text("utf-8")
     assert "ap (in)" in page
     assert "(mm)" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes")
+@pytest.mark.timeout(20)
+def test_units_of_a_pipe_and_of_deep_tables_are_metric(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    os.mkfifo(path)
+    assert read_units(tmp_path) == "metric"
+    path.unlink()
+    path.write_text("[machine]\nunits = " + "[" * 50_000, "utf-8")
+    assert read_units(tmp_path) == "metric"
+    path.write_text('\ufeff[machine]\r\nunits = "inch"\r\n', "utf-8")
+    assert read_units(tmp_path) == "inch"
+
+
+def test_refused_depths_are_in_inches(inch: Shop) -> None:
+    options = "--tool", "reference", "--material", "AA 7075", "--teeth", "4", "--diameter", "1/2"
+    with pytest.raises(ValueError, match=r"--depth 2\.5 is deeper .* 0\.5 in\."):
+        ask("recommend", str(inch.path), *options, "--depth", "2.5")
+    with pytest.raises(ValueError, match=r"--depth 0 is not above 0.* in\."):
+        ask("observe", str(inch.path), "--program", "A", "--depth", "0", "--stable")
+
+
+def test_questions_about_settings_are_in_inches(inch: Shop) -> None:
+    inch.edit("[tap]", "[tap]\nstick_out_mm = 500")
+    machine = inch.logbook.machine
+    slow = replace(machine.all_programs[0], tool_diameter_mm=25.4, speed_rpm=10.0)
+    with shown_units("inch"):
+        reasons = {question.key: question.reason for question in find_program_questions(machine, slow, on_model=False)}
+    assert "2.62 sfm" in reasons["speed_rpm"]
+    assert "outside 9.84" in reasons["speed_rpm"]
+    assert "diameters of 1 in," in reasons["stick_out_mm"]
 
 
 def answer(units: Any, name: str, text: str) -> MachineDraft:

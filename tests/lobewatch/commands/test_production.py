@@ -46,7 +46,10 @@ def test_a_recommendation_ends_in_ordinary_cuts_and_each_cut_names_the_next(mill
     first = ladder["steps"][0]
     place = "--speed", f"{first['speed_rpm']:g}", "--depth", f"{first['depth_mm']:g}"
     made = observe(mill, *place, "--stable", "--power", f"{0.8 * first['expected_power_kw']:.3f}")
-    assert made["next_step"]["speed_rpm"] * made["next_step"]["depth_mm"] > rates[0]
+    rate = made["next_step"]["speed_rpm"] * made["next_step"]["depth_mm"]
+    assert rate > rates[0]
+    shown, expected = made["next_step"]["expected_power_kw"] / rate, first["expected_power_kw"] / rates[0]
+    assert 0.75 * expected < shown < 0.95 * expected
     assert made["asks"] is None
 
 
@@ -67,6 +70,7 @@ def test_a_power_without_a_verdict_is_stored_and_counts_once_a_day(mill: Shop) -
     assert observe(mill, "--power", "1.1")["next_step"] == made["next_step"]
     assert answer(mill, "suggest", "--program", "A")["cuts_made"] == 0
     assert "power reading" in invoke(["history", str(mill.path)]).stdout
+    assert "cuts-without-verdict" not in invoke(["check", str(mill.path), "--json"]).stdout
 
 
 def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing(mill: Shop) -> None:

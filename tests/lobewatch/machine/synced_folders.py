@@ -35,6 +35,7 @@ CONFLICT_NAMES: tuple[Callable[[Path], str], ...] = (
     lambda path: f"{path.name}~",
     lambda path: f"{path.stem}-PC-B{path.suffix}",
     lambda path: f"冲突的副本 {path.name}",
+    lambda path: f".{path.name}.tmp",
 )
 """Names that sync programs give the other side of a file."""
 UNSYNCED = (".lock", ".lock.holder", "history.rows", "standing.json")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from acquisition import Circumstances, SourceFile, TapTest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_updates import (
     add_event,
@@ -25,6 +28,7 @@ from lobewatch.machine.verify_files import verify
 from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 from tests.lobewatch.machine.synced_folders import (
     CONFLICT_NAMES,
+    FRF,
     TwoCopies,
     find_remaining_problems,
     read_files,
@@ -118,6 +122,18 @@ def test_the_other_side_is_named_whatever_its_name_and_joined_by_rebuild(two: Tw
     assert [event.text for event in contents.events] == ["belt changed"]
     assert {file.name for file in (a.path / "sync-conflicts").iterdir()} == conflicts
     assert rebuild_files(a.path) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems store no such name")
+def test_a_file_whose_name_is_no_text_is_named_and_joined(two: TwoCopies) -> None:
+    a, b = map(MachineFolder, two.paths)
+    add_event(b, "belt changed")
+    (a.path / os.fsdecode(b"journal\xff.jsonl")).write_bytes((b.path / NAMES[0]).read_bytes())
+    texts = [*map(str, verify(a.path).remarks), *map(str, a.contents().remarks)]
+    assert [text.count("\\udcff.jsonl") for text in texts] == [1, 1]
+    texts += rebuild_files(a.path)
+    assert "".join(texts).encode()
+    assert [event.text for event in MachineFolder(a.path).contents().events] == ["belt changed"]
 
 
 def test_identities_of_both_sides_are_renumbered_with_all_that_names_them(two: TwoCopies) -> None:
@@ -217,6 +233,18 @@ def test_a_tap_test_with_the_identity_of_another_one_gets_its_own(two: TwoCopies
     assert MachineFolder(two.paths[0]).read(taps["tap_3-2"]).circumstances.operator == taps["tap_3-2"].operator
     assert {taps[name].operator for name in ("tap_3", "tap_3-2")} == {"no 1", "no 2"}
     assert verify(two.paths[0]).damage == ()
+
+
+def test_a_recording_that_both_computers_replayed_counts_once(two: TwoCopies) -> None:
+    source = SourceFile("tap.csv", b"1,2")
+    for path, name in zip(two.paths, ("tap_8", "tap_7"), strict=True):
+        about = Circumstances("m", datetime(2026, 3, 1, tzinfo=UTC))
+        MachineFolder(path).commit(TapTest(name, about, FRF, source=source))
+    two.sync(0, 0)
+    assert any("tap_8" in text for text in rebuild_files(two.paths[0]))
+    taps = {tap.id: bool(tap.excluded) for tap in MachineFolder(two.paths[0]).taps()}
+    assert (taps["tap_7"], taps["tap_8"]) == (False, True)
+    assert rebuild_files(two.paths[0]) == []
 
 
 def test_other_settings_are_named_with_both_values_until_a_person_decides(two: TwoCopies) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from written_tables import FORCE, RESPONSE, TIME, F, H, complaint, is_h, put, rows
 
 from acquisition import DataError, Description, inspect_file, read_frf, read_hits, read_recording
+from acquisition.files.readers.table_layout import begins_with_number
 
 
 @pytest.mark.parametrize(
@@ -204,3 +206,10 @@ def test_whatever_the_layout_two_commands_read_it(tmp_path: Path, layout: tuple[
     found = found if is_said else inspect_file(path, Description(columns=columns))
     assert found.require_valid().frf is not None
     assert is_h(found.frf)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("line", ["9" * 20_000 + "i", "(" + "9" * 20_000 + "i", "1 " * 10_000 + "(i"])
+def test_a_line_made_to_be_slow_is_not(line: str) -> None:
+    begin = time.process_time()
+    begins_with_number(line)
+    assert time.process_time() - begin < 1.0

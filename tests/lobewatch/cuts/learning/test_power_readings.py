@@ -11,12 +11,15 @@ import pytest
 
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, estimate_force_by_power
 from lobewatch.cuts.learning.drive_gain import power_log_likelihood
-from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
+from lobewatch.cuts.learning.posterior import Contradiction, inconsistent_cut_remarks
 from lobewatch.cuts.learning.power_readings import find_reading_remarks, merge_readings
+from lobewatch.cuts.learning.program_learning import learn_program
 from lobewatch.machine.folder_updates import make_observed_cut
-from lobewatch.machine.journal.entries import CutEntry, parse_cut_line
+from lobewatch.machine.journal.entries import CutEntry, CutVerdict, parse_cut_line
 from lobewatch.machine.settings.machine_file import Machine, parse_machine_file
 from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.tool.assembly import Assembly
+from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 START = datetime(2026, 5, 4, 6, tzinfo=UTC)
@@ -73,10 +76,11 @@ def test_many_readings_of_one_program_and_day_count_as_one(machine: Machine) -> 
 
 
 def test_a_busy_day_outweighs_no_other_day_and_one_wrong_reading_moves_nothing(machine: Machine) -> None:
-    days = [reading(machine, 1.0, 0.01 * k) for k in range(9)] + [reading(machine, 1.2, 1), reading(machine, 1.2, 2)]
+    days = [reading(machine, 1.0, 0.01 * k) for k in range(9)]
+    days += [reading(machine, power, day) for day, power in ((1, 1.2), (3, 1.2), (2, 1.9))]
     ((merged, count),) = merge_readings(days)
     assert merged.power is not None
-    assert count == 3
+    assert (merged.id, count) == ("c3", 4)
     assert merged.power.tangential == pytest.approx(reading(machine, 1.2).power.tangential)  # type: ignore[union-attr]
 
 
@@ -98,6 +102,14 @@ def test_a_reading_teaches_kt_and_nothing_else(mill: Mill) -> None:
     assert abs(after["tangential"].mean - 0.8) < 0.12
     for name in ("ratio", "damping_x", "stiffness_y"):
         assert after[name].mean == pytest.approx(before[name].mean, rel=0.05)
+
+
+@pytest.mark.parametrize(("verdict", "depth"), [("stable", 2.5e-3), ("chatter", 4e-3)])
+def test_a_reading_at_the_place_of_a_cut_is_no_verdict_on_it(mill: Mill, verdict: CutVerdict, depth: float) -> None:
+    made = CutEvidence(SLOT, 12000, depth, verdict, 1700.0 if verdict == "chatter" else float("nan"))
+    read = replace(made, verdict="cannot tell", frequency=float("nan"), power=PowerEvidence(1.1, 1e3, 1e3))
+    alone, both = mill.prior.learn_from(made), mill.prior.learn_from(read).learn_from(made)
+    assert both.log_weight - alone.log_weight == pytest.approx(np.zeros(len(alone.samples)), abs=0.01)
 
 
 def test_the_gain_is_common_to_all_materials(mill: Mill) -> None:
@@ -133,6 +145,21 @@ def test_powers_of_another_program_of_another_day_and_of_another_material_are_as
     assert codes(machine, reading(machine, 0.5 * usual, 4), *earlier) == ["power-changed", "material-contradicted"]
     assert codes(machine, reading(machine, 2.3 * usual)) == ["material-contradicted"]
     assert codes(machine, reading(machine, 1.4 * usual)) == []
+    asked = "material-contradicted"
+    assert asked not in codes(machine, reading(machine, 0.52 * usual))
+    for share, is_asked in ((1.9, True), (0.47, False)):
+        assert codes(machine, replace(reading(machine, share * usual), word="chatter")).count(asked) == is_asked
+
+
+@pytest.mark.parametrize("share", [0.45, 0.8, 2.2])
+def test_a_reading_off_by_two_is_asked_about_and_never_makes_kt_smaller(machine: Machine, share: float) -> None:
+    x, y = [Mode(1713.0, 0.029, 3.5e7)], [Mode(1400.0, 0.035, 2.5e7)]
+    tool = Assembly("reference", START, "drawn", x, y, ("x", "y"), None, {}, False, ())
+    entry = reading(machine, share * expected_kilowatts(machine))
+    found = learn_program(machine.program[0], tool, machine, [entry])
+    before, after = (one.intervals["tangential"].mean for one in (found.prior, found.posterior))
+    assert [odd.contradiction for odd in found.inconsistent_cuts] == [Contradiction.MATERIAL] * (share != 0.8)
+    assert np.sign(round(after - before, 6)) == {0.45: 0, 0.8: -1, 2.2: 1}[share]
 
 
 @pytest.mark.parametrize("kilowatts", [0.3, 1100.0, 31.0])

@@ -48,6 +48,13 @@ def test_the_middle_of_each_mode_drops_by_its_share() -> None:
     assert (middle["frequency_x"][0], middle["frequency_y"][0]) == pytest.approx((0.98, 0.96))
 
 
+def test_wear_raises_kt_most_where_it_is_largest() -> None:
+    sharp = draws({7: -99.0}, {}, {7: 99.0})
+    worn = replace(sharp, uncertainty=replace(sharp.uncertainty, wear=1.6))
+    assert worn.force_factors(0) / sharp.force_factors(0) == pytest.approx([1.0, 1.3, 1.6])
+    assert worn.ratios()["ratio"] == pytest.approx(sharp.ratios()["ratio"])
+
+
 @pytest.mark.parametrize(("side", "first"), [("x", 2), ("y", 4)])
 def test_a_standard_deviation_is_25_percent_of_damping_and_10_of_stiffness(side: str, first: int) -> None:
     ratios = draws({first: 1.0}, {first + 1: -1.0}, {first: -9.0}, {first + 1: -99.0}).ratios()

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lobewatch.cuts.learning import production_ladder
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, find_questioned_cut, predict_cut
-from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, Ladder, find_ladder
-from lobewatch.cuts.learning.suggestion import suggest_cut
-from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
+from lobewatch.cuts.learning.posterior import build_prior
+from lobewatch.cuts.learning.process_damping import ProcessDamping
+from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, N_LADDER_SAMPLES, Ladder, find_ladder
+from lobewatch.cuts.learning.suggestion import CutGrid, suggest_cut
+from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
 
 
 def stable(depth: float, speed: float = 9000.0, name: str = "c1") -> CutEvidence:
@@ -41,6 +44,23 @@ def test_each_step_removes_more_and_hardly_chatters_after_the_steps_before(mill:
         assert chance <= MAX_CUT_RISK + 0.02
         assert step.removal_rate > rate
         posterior, rate = posterior.learn_from(made), step.removal_rate
+
+
+def test_the_chance_of_a_step_counts_the_error_of_the_speed(mill: Mill, ladder: Ladder) -> None:
+    first, few = ladder.steps[0], mill.prior.resample(N_LADDER_SAMPLES).samples
+    made = replace(mill.grid.build_evidence(first.speed_rpm, first.depth), speed_found=False)
+    assert first.chatter_probability == pytest.approx(np.mean(predict_cut(made, few).chatter_probability))
+    assert np.ptp(few.at_rest.speed_rpm) > 0
+
+
+def test_the_ladder_expects_some_process_damping(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:
+    prior = build_prior(mill.middle, doubt(), 200, damping=ProcessDamping(0.0, 5e5, 0.02))
+    speeds = np.array([1000.0, 1200.0])
+    grid = CutGrid(SLOT, (0.0,), speeds, np.full(2, 0.006), np.ones(2))
+    (likely,) = find_ladder(prior, grid, (), (), None, 1).steps
+    monkeypatch.setattr(production_ladder, "ABSENT_DAMPING_FACTOR", 1.0)
+    (unlikely,) = find_ladder(prior, grid, (), (), None, 1).steps
+    assert likely.removal_rate > unlikely.removal_rate
 
 
 def test_no_step_gains_less_than_what_runs(mill: Mill, ladder: Ladder) -> None:

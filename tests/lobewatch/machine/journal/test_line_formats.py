@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
@@ -22,25 +22,37 @@ from lobewatch.monitoring.status_rules import STATUS_BY_CODE, StatusLevel
 MakeTap = Callable[..., TapTest]
 TAP = "tap_1"
 FIELDS_OF_FORMAT_2 = {
-    "accept": "code tap",
-    "ack": "about baseline code newest note operator raised_by until",
-    "cut": "at by chatter_frequency_hz chatter_frequency_std_hz coefficients commanded_rpm cut depth excluded feed "
-    "feed_per_tooth id parts power program reason recording software speed_rpm tool word",
-    "event": "date id new_baseline text",
-    "exclude": "reason tap",
-    "hit": "codes decision hit tap",
-    "include": "tap",
-    "join": "contradictions file lines renumbered",
-    "lost": "line tap",
-    "mass-check": "chain date excluded id mass_kg operator passed ratio ratio_std",
-    "modes": "add drop fix tap",
-    "note": "text",
-    "scatter": "alone common series",
-    "tap": "accepted asked asked_live by_hand chain conditions direction excluded hit_decisions id is_mass_checked "
+    "tap": "accepted asked asked_live by_hand by_hand.add by_hand.drop by_hand.fix chain "
+    "chain.acceleration_range_v chain.acceleration_v_per_m_s2 chain.daq chain.force_range_v "
+    "chain.force_v_per_n conditions conditions.drawbar_kn conditions.hours conditions.note "
+    "conditions.reclamped conditions.state conditions.stick_out_mm conditions.temperature_c direction "
+    "excluded hit_decisions hit_decisions.codes hit_decisions.decision hit_decisions.decision=accept "
+    "hit_decisions.decision=reject hit_decisions.decision=undo hit_decisions.hit id is_mass_checked "
     "operator sha256 size source_sha256 tool",
+    "cut": "at by by=accelerometer by=display by=ear by=microphone chatter_frequency_hz chatter_frequency_std_hz "
+    "coefficients commanded_rpm cut cut.direction cut.direction=down cut.direction=up cut.feed_angle "
+    "cut.helix_lag cut.immersion cut.pitch cut.process_damping cut.radial cut.tangential cut.teeth depth "
+    "excluded feed feed_per_tooth id parts parts.from_s parts.hz parts.to_s parts.verdict "
+    "parts.verdict=cannot tell parts.verdict=chatter parts.verdict=flip parts.verdict=stable power "
+    "power.edge_known power.edge_share power.tangential power.watts program reason recording recording.id "
+    "recording.sha256 recording.size software speed_rpm tool word word=cannot tell word=chatter word=flip "
+    "word=stable",
+    "mass-check": "chain chain.acceleration_range_v chain.acceleration_v_per_m_s2 chain.daq chain.force_range_v "
+    "chain.force_v_per_n date excluded id mass_kg operator passed ratio ratio_std",
+    "ack": "about baseline code newest note operator raised_by until",
+    "scatter": "alone common series",
+    "hit": "codes decision decision=accept decision=reject decision=undo hit tap",
+    "modes": "add drop fix tap",
+    "accept": "code tap",
+    "exclude": "reason tap",
+    "include": "tap",
+    "lost": "line tap",
+    "event": "date id new_baseline text",
     "withdrawal": "withdraws",
+    "join": "contradictions contradictions.about contradictions.kept contradictions.other file lines renumbered",
+    "note": "text",
 }
-"""Fields of each kind of line, besides those of all lines. Raise JOURNAL_FORMAT with every change."""
+"""Fields and enumerated values of each kind of line without those of all lines. Raise JOURNAL_FORMAT with a change."""
 NOT_UNDERSTOOD: list[dict[str, Any]] = [
     {"kind": "polish", "grit": 400},
     {"kind": ["exclude"], "tap": TAP},
@@ -78,10 +90,25 @@ def codes(folder: MachineFolder) -> list[str]:
     return [remark.code for remark in MachineFolder(folder.path).contents().remarks]
 
 
-def test_a_new_field_or_kind_raises_the_number_of_the_format() -> None:
-    common = {*LineFrame.__struct_fields__}
-    fields = {name: " ".join(sorted(kind.fields - common)) for name, kind in LINE_KINDS.items()}
-    assert fields == FIELDS_OF_FORMAT_2
+def list_fields(kind: Any) -> Iterator[str]:
+    """Yield the fields of a type, those of a table in it as `table.field`, and enumerated values as `field=value`."""
+    for name, hint in get_type_hints(kind).items() if hasattr(kind, "__annotations__") else ():
+        yield name
+        for part in list_parts(hint):
+            yield from [f"{name}={part}"] if isinstance(part, str) else (f"{name}.{key}" for key in list_fields(part))
+
+
+def list_parts(hint: Any) -> Iterator[Any]:
+    yield hint
+    for part in get_args(hint):
+        yield from list_parts(part)
+
+
+def test_a_new_field_kind_or_value_raises_the_number_of_the_format() -> None:
+    frame = {*LineFrame.__struct_fields__}
+    listed = {name: {field for one in kind.types for field in list_fields(one)} for name, kind in LINE_KINDS.items()}
+    assert all(kind.fields <= listed[name] | frame for name, kind in LINE_KINDS.items())
+    assert {name: " ".join(sorted(fields - frame)) for name, fields in listed.items()} == FIELDS_OF_FORMAT_2
     assert JOURNAL_FORMAT == 2
 
 
@@ -131,6 +158,14 @@ def test_a_known_line_with_an_unknown_field_counts_and_is_named(
     assert [tap.excluded for tap in contents.taps] == ["", "x", ""]
     assert [tap.id for tap in contents.lost] == ["tap_8"]
     assert codes(folder).count("journal-newer") == 2
+
+
+def test_an_unknown_field_of_a_table_in_a_line_is_named(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    conditions = {"state": "warm", "weather": "rain"}
+    append(folder, folder.taps()[2].line | {"id": "tap_8", "conditions": conditions}, JOURNAL_FORMAT + 1, monkeypatch)
+    (fault,) = folder.journal.read().faults
+    assert (fault.is_newer, fault.is_used) == (True, True)
+    assert "conditions.weather" in fault.text
 
 
 def test_a_line_of_a_newer_version_that_is_understood_needs_no_remark(

@@ -25,6 +25,7 @@ from acquisition.arrays import Floats
 from acquisition.errors import DataError
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.readers.read_audio import decode_audio
+from acquisition.subprocess_guard import run_in_subprocess
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import store_recorded_cuts
 from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
@@ -345,10 +346,10 @@ def test_a_recording_that_is_stopped_after_its_cut_is_kept_says_so_and_keeps_it_
     program, table = next(iter(Logbook.open(mill).machine.cut_tables.items()))
     speed = RPM * FLUTES / table.teeth
     entered = uploaded_recording.UploadedCut(table.teeth, speed, depth_mm=1, machine="mill", program=program)
-    sound, run = encode(sound_of_a_cut(), "WAV"), uploaded_recording.run_in_subprocess
+    sound = encode(sound_of_a_cut(), "WAV")
 
     def stop(*arguments: str, **options: Any) -> bytes:
-        run(*arguments, **options)
+        run_in_subprocess(*arguments, **options)
         raise subprocess.TimeoutExpired("python", 0)
 
     with monkeypatch.context() as patched:

@@ -228,10 +228,10 @@ def test_the_speed_of_a_cut_is_that_of_its_longest_windows(early: CutEvaluation)
 @pytest.mark.parametrize(("spacing", "differs"), [(200.0, False), (200.3, False), (198.9, True), (201.0, True)])
 def test_side_bands_of_another_spacing_belong_to_another_speed(spacing: float, differs: bool) -> None:
     """Harmonics that a sensor without a filter folds back are one tooth passing of their own speed apart."""
-    frequency = 320.0 + spacing * np.arange(3)
+    frequency = np.array([320.0, 320.0 + spacing, 320.0 + 2 * spacing], dtype=np.float64)
     peaks = SpectralPeaks(frequency, np.ones(3), np.full(3, 1e3))
     assert has_other_spacing(ChatterPeaks(320.0, 0.1, peaks), 200.0) == differs
-    assert not has_other_spacing(ChatterPeaks(320.0, 0.1, peaks[:1]), 200.0)
+    assert not has_other_spacing(ChatterPeaks(320.0, 0.1, peaks[np.array([0])]), 200.0)
 
 
 def test_parts_between_overlapping_windows_with_chatter_end_after_they_begin() -> None:

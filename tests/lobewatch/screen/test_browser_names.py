@@ -41,7 +41,8 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
             assert old in text
             text = text.replace(old, json.dumps(name, ensure_ascii=False))
         toml.write_text(text, "utf-8")
-    make_machine_folder(path / "<img src=x onerror=window.ran=1>'\"`", "surrogate_machine.toml")
+    hostile = make_machine_folder(path / "hostile", "surrogate_machine.toml").parent
+    hostile.rename(path / "<img src=x onerror=window.ran=1>'\"`")  # a name that Windows and lobewatch refuse
     return path
 
 

@@ -69,18 +69,19 @@ def _add_machine_list(
 
     async def list_programs(request: web.Request) -> web.Response:
         folder = find_folder(request.match_info["machine"])
-        return web.json_response({"programs": await asyncio.to_thread(_list_cuts, folder)})
+        return web.json_response(await asyncio.to_thread(_describe_machine, folder))
 
     application.router.add_get(f"{prefix}machines", list_machines)
     application.router.add_get(f"{prefix}machines/{{machine}}", list_programs)
     return find_folder
 
 
-def _list_cuts(folder: Path) -> list[dict[str, Any]]:
-    """List the cuts of machine.toml with flutes, and with speed and depth if they have some."""
-    tables = MachineFolder(folder).machine.cut_tables
-    keys = ("teeth", "speed_rpm", "depth_mm")
-    return [{"name": name} | {key: _known(getattr(cut, key, None)) for key in keys} for name, cut in tables.items()]
+def _describe_machine(folder: Path) -> dict[str, Any]:
+    """Return the units of machine.toml, and its cuts with flutes, and with speed and depth if they have some."""
+    machine, keys = MachineFolder(folder).machine, ("teeth", "speed_rpm", "depth_mm")
+    cuts = machine.cut_tables.items()
+    listed = [{"name": name} | {key: _known(getattr(cut, key, None)) for key in keys} for name, cut in cuts]
+    return {"units": machine.machine.units, "programs": listed}
 
 
 def _known(value: float | None) -> float | None:

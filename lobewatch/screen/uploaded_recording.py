@@ -23,6 +23,7 @@ from lobewatch.logbook.cut_comparison import CutComparison, compare_cuts, find_w
 from lobewatch.logbook.heard_cuts import ASSUMED_RANGE, CutFileRequest, hear_signal
 from lobewatch.machine.journal.entries import CutEntry
 from lobewatch.machine.settings.cut_tables import ProgramTable
+from lobewatch.machine.settings.display_units import shown_units
 from lobewatch.machine.settings.requested_cut import CutSetting, find_cut_setting
 from lobewatch.machine.settings.setup_tables import SpeedTable
 from lobewatch.machine.settings.toml import find_plausible_ranges
@@ -231,8 +232,9 @@ def _keep(signal: CutSignal, cut: UploadedCut, folder: Path, content: bytes) -> 
         stored = store_recorded_cuts(logbook.folder, comparisons, signal, None, upload, kept)
     except (OSError, ValueError) as error:
         return refuse("not-kept", format_error(error))
-    speeds, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
-    shown = [*recording_texts(comparisons), *remark_lines(remarks)]
+    with shown_units(logbook.machine.machine.units):
+        speeds, texts, remarks = stored_answer(logbook, comparisons, earlier, stored)
+        shown = [*recording_texts(comparisons), *remark_lines(remarks)]
     answer = _answer(comparisons, {"next_speeds": [], **speeds}, shown, texts if speeds else ())
     return answer | {"saved": [entry.id for entry in stored]}
 

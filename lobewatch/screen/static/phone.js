@@ -21,6 +21,7 @@ for (const [id, other] of [["record", "choose"], ["choose", "record"]]) {
 }
 
 let programs = [];
+let unit = { name: "mm", mm: 1 };
 
 const option = (name, text = name) => Object.assign(document.createElement("option"), { value: name, textContent: text });
 
@@ -32,7 +33,9 @@ ask("machines").then(({ machines }) => {
 at("machine").addEventListener("change", async () => {
   const machine = at("machine").value;
   try {
-    programs = machine ? (await ask(`machines/${encodeURIComponent(machine)}`)).programs : [];
+    const answer = machine ? await ask(`machines/${encodeURIComponent(machine)}`) : { programs: [], units: "metric" };
+    programs = answer.programs;
+    useUnit(answer.units === "inch" ? { name: "in", mm: 25.4 } : { name: "mm", mm: 1 });
   } catch (error) {
     programs = [];
     fail(error.message);
@@ -42,10 +45,22 @@ at("machine").addEventListener("change", async () => {
   enterProgram();
 });
 
+// A depth in the shown unit that is never deeper.
+const shownDepth = (mm) => (unit.mm === 1 ? mm : Math.floor((mm / unit.mm) * 1e4 + 1e-6) / 1e4);
+const depthInMm = () => Number(at("depth_mm").value) * unit.mm;
+
+function useUnit(next) {
+  const depth = at("depth_mm").value && depthInMm();
+  unit = next;
+  put("unit", unit.name);
+  if (depth) at("depth_mm").value = shownDepth(depth);
+}
+
 // Enters what machine.toml says of the program.
 function enterProgram() {
   const chosen = programs.find(({ name }) => name === at("program").value) ?? {};
-  for (const id of ["teeth", "speed_rpm", "depth_mm"]) if (chosen[id] != null) at(id).value = chosen[id];
+  for (const id of ["teeth", "speed_rpm"]) if (chosen[id] != null) at(id).value = chosen[id];
+  if (chosen.depth_mm != null) at("depth_mm").value = shownDepth(chosen.depth_mm);
 }
 
 at("program").addEventListener("change", enterProgram);
@@ -73,7 +88,7 @@ const grouped = (value) => Math.round(value).toLocaleString("en").replaceAll(","
 
 function expectation({ depth_mm: depth, relative_depth: gain, window_rpm: [low, high] }) {
   const deeper = `about ${gain < 10 ? gain.toFixed(1) : "10 or more"} times as deep as at this speed`;
-  return `${depth === null ? "" : `try ${depth} mm, `}${deeper}, best from ${grouped(low)} to ${grouped(high)} rpm`;
+  return `${depth === null ? "" : `try ${shownDepth(depth)} ${unit.name}, `}${deeper}, best from ${grouped(low)} to ${grouped(high)} rpm`;
 }
 
 function speedItem(next) {
@@ -81,7 +96,7 @@ function speedItem(next) {
   button.append(element("b", `${grouped(next.speed_rpm)} rpm`), element("span", expectation(next)));
   button.addEventListener("click", () => {
     at("speed_rpm").value = Math.round(next.speed_rpm);
-    if (next.depth_mm !== null) at("depth_mm").value = next.depth_mm;
+    if (next.depth_mm !== null) at("depth_mm").value = shownDepth(next.depth_mm);
     at("form").scrollIntoView();
   });
   const item = document.createElement("li");
@@ -108,8 +123,10 @@ at("form").addEventListener("submit", async (event) => {
   event.preventDefault();
   if (!recording) return fail("No recording yet. Record a cut or choose a file.");
   if (recording.size > MAX_MB * 1e6) return fail(`The recording is larger than ${MAX_MB} MB. Send a shorter recording.`);
-  const values = [...STORED, "machine", "program"].map((id) => [id, at(id).value]).filter(([, value]) => value);
-  for (const id of STORED) localStorage.setItem(id, at(id).value);
+  const depth = at("depth_mm").value && depthInMm();
+  const entered = (id) => (id === "depth_mm" ? depth : at(id).value);
+  const values = [...STORED, "machine", "program"].map((id) => [id, entered(id)]).filter(([, value]) => value);
+  for (const id of STORED) localStorage.setItem(id, entered(id));
   const clock = startClock();
   at("send").disabled = true;
   await ask(`recording?${new URLSearchParams(values)}`, "POST", recording).then(showResult).catch((error) => fail(error.message));

@@ -402,3 +402,20 @@ def test_the_page_shows_chatter_and_enters_the_next_speed(
     shown = "".join(best.text.partition(" rpm")[0].split())
     assert browser.part("speed_rpm").get_attribute("value") == shown
     assert browser.requested() == {server.origin}
+
+
+def test_depths_of_a_machine_in_inches_are_entered_in_inches(browser: Browser, tmp_path: Path) -> None:
+    toml = make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
+    toml.write_text(toml.read_text("utf-8").replace("[machine]", '[machine]\nunits = "inch"', 1), "utf-8")
+    with DashboardServer(tmp_path) as server:
+        browser.open(f"{server.origin}/phone/#token={server.token}", SIZES[0])
+        browser.part("depth_mm").send_keys("50.8")
+        browser.wait(lambda: browser.part("machine").is_displayed())
+        browser.part("machine").send_keys("mill")
+        browser.see("unit", "in")
+        browser.part("program").send_keys("A")
+        depth = browser.part("depth_mm")
+        browser.wait(lambda: depth.get_attribute("value") == "0.0984")
+        browser.part("machine").send_keys("\ue013" * 2)
+        browser.see("unit", "mm")
+        assert float(depth.get_attribute("value") or 0) == pytest.approx(2.5, abs=0.003)

@@ -21,7 +21,7 @@ from modal import ModeEdits
 JOURNAL_FORMAT = 2
 """Number of the newest format, raised with every new kind, field or value.
 
-1: lines without a number. 2: kind "join", test cuts by the "display" of the drive.
+1: lines without a number. 2: kind "join", test cuts by the "display" of the drive, "upload" of a cut.
 """
 FORMAT_KEY, JOINED_KEY = "format", "joined"
 """Keys of the number of the format, and of the mark of the line of another computer that a line was joined from."""

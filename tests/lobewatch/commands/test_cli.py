@@ -369,6 +369,7 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
     refused(run("demo", "--out", "lobewatch-demo"), "lobewatch-demo/machine.toml")
 
 
+@pytest.mark.long
 def test_the_demo_over_tcp_needs_no_pseudo_terminal_and_finds_the_same(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

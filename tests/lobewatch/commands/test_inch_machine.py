@@ -81,8 +81,13 @@ def test_recommended_settings_are_in_inches(inch: Shop) -> None:
     answer = ask("recommend", str(inch.path), *options)
     assert answer.exit_code == 0
     assert not METRIC_WORD.search(answer.output)
-    metric = as_metric(inch, "recommend", str(inch.path), *options[:-1], "12.7", "--json")
-    assert ask("recommend", str(inch.path), *options, "--json").stdout == metric
+
+
+@pytest.mark.long
+def test_a_recommendation_in_json_is_the_same_in_both_units(inch: Shop) -> None:
+    options = "--tool", "reference", "--material", "AA 7075", "--teeth", "4", "--diameter"
+    metric = as_metric(inch, "recommend", str(inch.path), *options, "12.7", "--json")
+    assert ask("recommend", str(inch.path), *options, "1/2", "--json").stdout == metric
 
 
 @pytest.mark.parametrize("command", ["check", "status"])

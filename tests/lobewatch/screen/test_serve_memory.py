@@ -56,6 +56,7 @@ def live_tests() -> int:
     return sum(isinstance(thing, LiveTest) for thing in gc.get_objects())
 
 
+@pytest.mark.long
 def test_one_test_and_one_report_a_machine_are_kept(served: DashboardServer, tmp_path: Path) -> None:
     before = live_tests()  # of servers that have ended: aiohttp remembers them
     addresses = [tap(served, number) for number in range(3)]

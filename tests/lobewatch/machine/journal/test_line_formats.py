@@ -35,7 +35,7 @@ FIELDS_OF_FORMAT_2 = {
     "excluded feed feed_per_tooth id parts parts.from_s parts.hz parts.to_s parts.verdict "
     "parts.verdict=cannot tell parts.verdict=chatter parts.verdict=flip parts.verdict=stable power "
     "power.edge_known power.edge_share power.tangential power.watts program reason recording recording.id "
-    "recording.sha256 recording.size software speed_rpm tool word word=cannot tell word=chatter word=flip "
+    "recording.sha256 recording.size software speed_rpm tool upload word word=cannot tell word=chatter word=flip "
     "word=stable",
     "mass-check": "chain chain.acceleration_range_v chain.acceleration_v_per_m_s2 chain.daq chain.force_range_v "
     "chain.force_v_per_n date excluded id mass_kg operator passed ratio ratio_std",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,7 +29,7 @@ from tests.lobewatch.commands.invoke import invoke
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
 METRIC_WORD = re.compile(r"\d ?mm\b|\(mm\)|m/min|cm3")
-TEMPLATE = (Path(__file__).parents[3] / "sim_data" / "new_machine.toml").read_text("utf-8")
+TEMPLATE = resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8")
 
 
 @pytest.fixture

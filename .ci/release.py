@@ -21,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 WHEEL_FILES = ("pyproject.toml", "README.md", "LICENSE")
-"""Files of the wheel beside its packages."""
+"""Files of the wheel that are not in its packages."""
 EARLIEST_ZIP_TIME = "315532800"
 """1980-01-01, the time of all files of a wheel that is built outside of git (s)."""
 

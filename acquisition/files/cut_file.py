@@ -48,7 +48,7 @@ class CutSignal:
     more_channels: tuple[Channel, ...] = ()
     """Channels of the codes of further responses."""
     overload_spans: tuple[tuple[int, int], ...] = ()
-    """First sample of each reported overload, and the one after its last; empty if the file does not tell."""
+    """First sample of each reported overload, and the one after its last; empty if unknown."""
 
     @property
     def duration(self) -> float:

@@ -144,7 +144,7 @@ class TapsBridge(TapsServer):
         return ""
 
     def _refuse(self, error: HostileFrameError) -> None:
-        """Disconnect the host after what is pending for it has been sent, as far as it reads."""
+        """Disconnect the host after sending the pending bytes that it reads."""
         text = f"the connection from {self.wire.host_address} was closed, because {error}"
         self._tell(join_sentences(text, "Check the program on that computer"))
         self.wire.exchange(0.0)

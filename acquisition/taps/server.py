@@ -33,7 +33,7 @@ START_BYTES = 8
 
 
 class TapsServer:
-    """Device's end of a TAPS/1 wire. It answers the commands of the host and counts what it sends."""
+    """Device's end of a TAPS/1 wire. It answers the commands of the host and counts the sent scans."""
 
     wire: Wire
     _channels: tuple[Channel, ...]
@@ -77,7 +77,7 @@ class TapsServer:
         self._per_frame = min(per_frame, max_scans_per_frame(len(self._channels), self._bits))
 
     def _serve_host(self, timeout: float) -> None:
-        """Send what is pending, and execute and answer the commands that have arrived."""
+        """Send the pending bytes, then execute and answer the commands that have arrived."""
         for frame in self._decoder.feed(self.wire.exchange(timeout)):
             about = frame.seq.to_bytes(4, "little")
             try:

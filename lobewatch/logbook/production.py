@@ -66,7 +66,7 @@ def climb(
     running: tuple[float, float] | None = None,
     count: int = MAX_LADDER_CUTS,
 ) -> Ladder:
-    """Find the next ordinary cuts of a program, from what was learned.
+    """Find the next ordinary cuts of a program from its posterior.
 
     Parameters
     ----------

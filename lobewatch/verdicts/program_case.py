@@ -39,7 +39,7 @@ class SpindleAtSpeed:
     radial: float = math.nan
     """Cutting coefficient Kr in the learned median (N/mm2)."""
     process_damping: float = 0.0
-    """Process damping coefficient C in the learned median (N/m), or what machine.toml is sure of."""
+    """Process damping coefficient C in the learned median (N/m), or the low end in machine.toml."""
     prior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)
     """95 % intervals before the cuts, over the values not rotating, by name ("frequency_x", "tangential", ...)."""
     posterior_ranges: Mapping[str, FactorRange] = field(default_factory=dict)

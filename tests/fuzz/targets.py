@@ -183,7 +183,7 @@ def serving_bridge() -> Iterator[TapsBridge]:
 
 @st.composite
 def streams(draw: st.DrawFn) -> bytes:
-    """Draw frames with right checksums and wrong bodies, and what follows them."""
+    """Draw frames with right checksums and wrong bodies, followed by other bytes."""
     config = {"fs": RATE, "channels": [0, 1], "format": 0, "samples_per_frame": 512}
     info = protocol.build_info(EndlessDevice.identity, SENSORS, RATE, follows_clock=True) | {"serial": "1"}
     objects = edited_object(config) | edited_object(info)

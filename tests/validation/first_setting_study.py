@@ -33,7 +33,7 @@ LOW, HIGH = 600.0, 20000.0
 FILE = f'[machine]\nname = "drawn"\n[speed]\nlow_rpm = {LOW}\nhigh_rpm = {HIGH}\n'
 FAST_FILE = f'{FILE}[[tool]]\nname = "reference"\ncutting_speed_m_min = [20, 800]\n'
 CATALOGUE, FAST = parse_machine_file(FILE), parse_machine_file(FAST_FILE)
-"""Machines with the cutting speeds of the table, and with a tool that bears any speed of the spindle."""
+"""Machines with the cutting speeds of the table, and with a tool that allows any speed of the spindle."""
 MATERIALS = (
     "C45",
     "42CrMo4",

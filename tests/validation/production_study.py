@@ -15,6 +15,7 @@ from typing import Literal
 
 import msgspec
 import numpy as np
+from first_setting_study import MATERIALS
 from numpy.typing import NDArray
 
 from lobes.materials import fold_material_name, materials_by_name
@@ -33,18 +34,6 @@ Modes = tuple[tuple[float, float, float], ...]
 """Frequency (Hz), damping ratio and stiffness (N/m) of each mode."""
 Policy = Literal["production", "search"]
 
-MATERIALS = (
-    "C45",
-    "42CrMo4",
-    "16MnCr5",
-    "X5CrNi18-10",
-    "EN-GJL-250",
-    "EN-GJS-600-3",
-    "EN AW-6082",
-    "EN AW-7075",
-    "TiAl6V4",
-    "NiCr19Fe19Nb5Mo3",
-)
 TEETH, DIAMETER, FEED, DEEPEST = 4, 0.012, 8e-5, 0.012
 """Slots of four teeth: diameter, feed per tooth and largest depth (m)."""
 LOBES, DAMPED_LOBES = (1.0, 6.0), (8.0, 25.0)

@@ -1,4 +1,4 @@
-"""Ordinary cuts on hidden spindles: the judge against other forms and the time domain, and what the ladder reaches."""
+"""Ordinary cuts on hidden spindles: comparison of the criterion with the time domain, and results of the ladder."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
 
 
 def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
-    """Compare chatter with what ripple leaves in a stable cut: its side bands, and modes that ring after each rib."""
+    """Compare chatter with ripple in a stable cut: its side bands, and modes that ring after each rib."""
     if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None or sound.peaks is None:
         return sound
     about = sound.spectrum, sound.peaks.air.frequency, sound.spindle_speed.frequency

@@ -255,7 +255,7 @@ def widen_air(air: Spectrum) -> Spectrum:
 
 
 UNEVEN_MARGIN = 3.0
-"""Least distance from spindle harmonics and tones of the air of what is compared in time (Hz); chosen."""
+"""Least distance of the power compared in time from spindle harmonics and tones of the air (Hz); chosen."""
 UNEVEN_PIECE_LENGTH, UNEVEN_PIECES = 0.08, 8
 """Length of the loudest piece that is compared in time (s), and number of starts within a length; chosen.
 
@@ -263,7 +263,7 @@ Modes ring for less after a rib. Chatter that comes and goes with a ripple of 5 
 WINDOW_EDGE = 0.15
 """Share of a window at each end that is not compared in time, as little of it remains; chosen."""
 SILENT_POWER = 1e-9
-"""Power that is nothing, over the largest."""
+"""Power over the largest below which it counts as zero; chosen."""
 
 
 def compute_evenness(signal: Floats, spectrum: Spectrum, air: Floats, turn: float) -> float:

@@ -229,7 +229,7 @@ class CutPrediction(NamedTuple):
 
 
 def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
-    """Predict what samples would do in the worst feed direction of a cut, at its own depth; NaN without a verdict."""
+    """Predict the result of a cut for all samples in its worst feed direction; NaN without a verdict."""
     if not cut.has_verdict:
         unknown = np.full(len(samples), np.nan)
         return CutPrediction(unknown, unknown, unknown, np.zeros(len(samples), dtype=np.bool_))

@@ -28,7 +28,7 @@ def merge_readings(entries: Sequence[CutEntry]) -> list[tuple[CutEntry, int]]:
 
 
 def _program_key(entry: CutEntry) -> tuple[str, str, str, str]:
-    """Return what the readings of one program share."""
+    """Return the key of the program that a reading belongs to."""
     shape, material = geometry_key(entry.cut), material_key(entry.coefficients, entry.cut)
     return entry.tool, entry.program or "", str((*shape, entry.feed, entry.feed_per_tooth)), str(material)
 

@@ -1,4 +1,4 @@
-"""Process damping before the test cuts: the range of its coefficient C, and what a wear land adds."""
+"""Process damping before the test cuts: range of its coefficient C, and effect of a wear land."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from lobewatch.arrays import Floats
 from lobewatch.machine import CutTable, Machine, ProgramTable
 
 MAX_PROCESS_DAMPING = 5e5
-"""Largest C of a material of unknown C (N/m): assumed, as the range that published values are said to have."""
+"""Largest C of a material of unknown C (N/m): assumed from quoted values, not checked in a source."""
 ABSENT_SHARE = 0.5
 """Share of samples with the lowest C, which is 0 if nothing is known; chosen. So cuts must teach it."""
 INDENTATION_STIFFNESS = 3e13

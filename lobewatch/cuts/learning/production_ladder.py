@@ -1,4 +1,4 @@
-"""Ladder of ordinary cuts: each removes more than the one before it, and hardly chatters on what is known by then."""
+"""Ladder of ordinary cuts: each removes more than the one before it, at a small chance of chatter."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace

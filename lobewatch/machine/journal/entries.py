@@ -166,7 +166,7 @@ def geometry_key(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
 
 
 def material_key(material: str, cut: Cut) -> str | tuple[float, float]:
-    """Return what cuts of one material share: its name, or its coefficients if it has none."""
+    """Return the key of a material: its name, or its coefficients if it has none."""
     return material or (cut.tangential, cut.radial)
 
 

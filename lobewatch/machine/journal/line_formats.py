@@ -248,7 +248,7 @@ def _find_line_fault(number: int, line: bytes) -> LineFault | None:
 
 
 def _find_unknown_fields(written: object, understood: object, place: str = "") -> Iterator[str]:
-    """Yield the fields of a line, also of tables in it, that are not among those that were understood."""
+    """Yield the fields of a line and of its tables that this version does not understand."""
     if isinstance(written, dict) and isinstance(understood, dict):
         yield from (f"{place}{key}" for key in written.keys() - understood.keys())
         for key in written.keys() & understood.keys():
@@ -267,6 +267,6 @@ def _refuse_local_times(values: Iterable[object]) -> None:
 
 
 def _explain(error: Exception) -> str:
-    """Explain what is wrong with a field."""
+    """Explain the fault of a field."""
     found = re.fullmatch(r"Expected `(.+)`, got `(.+)` - at `\$\.(.+)`", str(error))
     return f"{found[3]} is of type {found[2]}, not {found[1]}" if found else str(error)

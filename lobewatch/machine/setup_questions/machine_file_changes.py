@@ -1,4 +1,4 @@
-"""Create and change machine.toml without loss of what another program or a person changed meanwhile."""
+"""Create and change machine.toml without losing the changes of other programs and persons."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

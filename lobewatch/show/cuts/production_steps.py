@@ -1,4 +1,4 @@
-"""Show the next ordinary cuts of a program, and what each of them tells."""
+"""Show the next ordinary cuts of a program, and the purpose of each."""
 
 import math
 import shlex
@@ -15,7 +15,7 @@ from lobewatch.verdicts import Setting
 
 
 def ladder_json(plan: ProductionPlan | None, running: Setting | None) -> JsonObject | None:
-    """Return what runs now and the next ordinary cuts; None if they are unknown."""
+    """Return the running setting and the next ordinary cuts; None if they are unknown."""
     if plan is None:
         return None
     now = running and {"speed_rpm": running.speed_rpm, "depth_mm": running.depth_mm}

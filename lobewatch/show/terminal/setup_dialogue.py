@@ -17,7 +17,7 @@ from lobewatch.show.terminal.output import notes
 def change_settings(
     machine: Path, answers: Mapping[str, str], edit: str, asks: bool, units: UnitSystem | None
 ) -> MachineDraft:
-    """Write the answers to one question to machine.toml. A key that changed meanwhile is asked about, or refused."""
+    """Write the answers to one question to machine.toml. If a key has changed meanwhile, ask or refuse."""
     folder = MachineFolder(machine)
     with folder.locked():  # a running tap test is named before the question
         seen = folder.toml_text

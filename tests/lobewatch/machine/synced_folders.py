@@ -252,5 +252,5 @@ def _write_files(path: Path, files: Mapping[str, bytes]) -> None:
 
 
 def find_remaining_problems(path: Path) -> list[str]:
-    """Return what verify still reports, apart from contradictions that wait for a person."""
+    """Return the findings of verify, except for contradictions that wait for a person."""
     return [str(remark) for remark in verify(path).damage if remark.code != "sync-contradiction"]

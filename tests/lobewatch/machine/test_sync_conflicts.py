@@ -41,7 +41,7 @@ STEPS = st.lists(
     min_size=2,
     max_size=14,
 )
-"""What is done, and a number that chooses where and on what."""
+"""Operation, and a number that chooses its folder and its entry."""
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def lines(path: Path, kind: str) -> list[dict[str, Any]]:
 
 
 def run_steps(two: TwoCopies, steps: list[tuple[str, int]]) -> list[str]:
-    """Let two people work, sync and rebuild, and return what neither counts nor is named."""
+    """Let two people work, sync and rebuild, and return the facts that neither count nor are named."""
     for action, number in steps:
         side, rest = number % 2, number // 2
         if action == "sync":

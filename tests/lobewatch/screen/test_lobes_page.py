@@ -48,12 +48,15 @@ def send(server: DashboardServer, body: Any, token: str = "") -> tuple[int, dict
 
 
 def test_the_page_answers_as_the_command(server: DashboardServer) -> None:
-    status, told = send(server, STATED | SETTING)
+    more: dict[str, Any] = {"modes_y": ["650 Hz 4% 12 N/um"], "radial_depth_mm": "3", "direction": "up"}
+    status, told = send(server, STATED | SETTING | more)
     assert status == 200
     assert told.pop("svg").lstrip().startswith("<")
     options = "--teeth", "4", "--material", "6061", "--diameter", '1/2"', "--speeds", "6000-9000"
-    setting = "--speed", "8000", "--depth", "0.3", "--json"
-    assert told == json.loads(invoke(["lobes", "--mode", STATED["modes"][0], *options, *setting]).stdout)
+    setting = "--mode-y", more["modes_y"][0], "--radial-depth", "3", "--direction", "up", "--speed", "8000"
+    assert told == json.loads(
+        invoke(["lobes", "--mode", STATED["modes"][0], *options, *setting, "--depth", "0.3", "--json"]).stdout
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Powers of normal production: a day counts once, a program is one piece of evidence, odd readings are asked about."""
+"""Powers of normal production: a day counts once, a program is one piece of evidence, odd readings raise a question."""
 
 from __future__ import annotations
 

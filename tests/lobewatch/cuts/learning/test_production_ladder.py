@@ -1,4 +1,4 @@
-"""The ladder of ordinary cuts: risk, gain, what chatter and power change, and a stable word that is asked again."""
+"""Ladder of ordinary cuts: risk, gain, effect of chatter and power, and a doubted stable verdict."""
 
 from __future__ import annotations
 

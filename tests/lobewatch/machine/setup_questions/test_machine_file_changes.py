@@ -1,4 +1,4 @@
-"""Two people, programs and an editor change one machine.toml: nothing is lost that was not asked about."""
+"""Two people, programs and an editor change one machine.toml: no change is lost without a question."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def program(name: str) -> ProgramTable:
 
 
 class Shop:
-    """A folder, and what must be in its machine.toml."""
+    """Machine folder, and the expected values in its machine.toml."""
 
     def __init__(self, path: Path) -> None:
         path.mkdir()

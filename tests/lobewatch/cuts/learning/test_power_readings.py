@@ -136,6 +136,15 @@ def test_a_wrong_gain_is_estimated_and_doubted_by_name(mill: Mill, shown: float,
     assert mill.prior.drive_gain is None
 
 
+def test_a_drive_that_shows_twice_the_power_does_not_hide_the_kt_that_cuts_tell(mill: Mill) -> None:
+    """One drive in fifty has a wrong gain: by the error of usual drives only, the interval would be above 1.25."""
+    mill.force = 1.1
+    chatter = [mill.chatter(speed) for speed in (6900.0, 9000.0, 13000.0)]
+    made = [*chatter, *(mill.hear(cut.speed_rpm, 0.82 * cut.depth) for cut in chatter)]
+    learnt = mill.learnt_from([replace(cut, power=PowerEvidence(2.4, 0.15, 0.05)) for cut in made])
+    assert learnt.intervals["tangential"].low < mill.force
+
+
 def test_powers_of_another_program_of_another_day_and_of_another_material_are_asked_about(machine: Machine) -> None:
     usual = expected_kilowatts(machine)
     earlier = [reading(machine, usual, day) for day in range(3)]

@@ -6,6 +6,7 @@ a wrong drive teach little, and stable and chattering cuts tell the gain in time
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,22 @@ def power_log_likelihood(cut: CutEvidence, samples: SpindleSamples, before: Sequ
     earlier = sum((_by_gain(other, samples, before[:k]) for k, other in enumerate(before)), start=_log_prior())
     joint = scipy.special.logsumexp(earlier + _by_gain(cut, samples, before), axis=-1)
     return np.asarray(joint - scipy.special.logsumexp(earlier, axis=-1))
+
+
+def wrong_verdict_log_ratio(cut: CutEvidence, samples: SpindleSamples, others: Sequence[CutEvidence]) -> Floats:
+    """Return the log likelihood of the power of a cut if its verdict is wrong over that if it is right, shape (r,).
+
+    Chatter lowers the power, so that the power of other cuts tells a wrong verdict. 0 without a power or a verdict.
+    """
+    if cut.power is None or not cut.has_verdict:
+        return np.zeros(len(samples))
+    other = replace(cut, power=cut.power.with_other_verdict(cut.has_chatter))
+    right, wrong = (
+        power_log_likelihood(each, samples, others)
+        - np.log(cut_likelihood.power_distance(each, np.ones(1), others)[1]) / 2
+        for each in (cut, other)
+    )
+    return np.asarray(wrong - right)
 
 
 def _by_gain(cut: CutEvidence, samples: SpindleSamples, before: Sequence[CutEvidence]) -> Floats:

@@ -175,8 +175,16 @@ def _cut_log_likelihood(
     cut: CutEvidence, samples: SpindleSamples, prediction: CutPrediction, before: Sequence[CutEvidence]
 ) -> Floats:
     """Return the log likelihood of one cut after those before it; an old cut counts less."""
-    word = cut_likelihood.log_likelihood(cut, prediction, [other for other in before if cut.is_repeat_of(other)])
-    return cut.weight * word + drive_gain.power_log_likelihood(cut, samples, before)
+    repeats = [other for other in before if cut.is_repeat_of(other)]
+    verdict = cut.weight * cut_likelihood.log_likelihood(cut, prediction, repeats)
+    if cut.power is None:
+        return verdict
+    power = drive_gain.power_log_likelihood(cut, samples, before)
+    if not cut.has_verdict:
+        return verdict + power
+    wrong = cut_likelihood.mislabel_probability(cut, prediction, repeats)
+    ratio = np.exp(drive_gain.wrong_verdict_log_ratio(cut, samples, before))
+    return verdict + power + np.log1p(wrong * (ratio - 1))
 
 
 def _refresh(posterior: Posterior) -> Posterior:
@@ -272,7 +280,9 @@ def wrong_label_probability(evidence: NewEvidence) -> float:
     """Return the probability that the verdict of a cut is wrong on spindles that explain all cuts."""
     cut, before = evidence.cut, evidence.prior
     wrong = cut_likelihood.mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))
-    return float(np.sum(before.weights * wrong))
+    others = [other for other in before.cuts if other is not cut]
+    ratio = np.exp(drive_gain.wrong_verdict_log_ratio(cut, before.samples, others))
+    return float(np.sum(before.weights * wrong * ratio / (1 - wrong + wrong * ratio)))
 
 
 def find_contradiction(evidence: NewEvidence) -> InconsistentCut | None:

@@ -17,7 +17,14 @@ from lobewatch.cuts.learning.posterior import POWER_CONTRADICTIONS, Contradictio
 from lobewatch.cuts.learning.power_readings import is_off_by_two
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 from lobewatch.cuts.learning.process_damping import find_process_damping
-from lobewatch.cuts.learning.suggestion import SPEED_GRID_STEP, CutGrid, Suggestion, compare_zero_order, suggest_cut
+from lobewatch.cuts.learning.suggestion import (
+    SPEED_GRID_STEP,
+    CutGrid,
+    Suggestion,
+    compare_zero_order,
+    find_cut_to_ask,
+    suggest_cut,
+)
 from lobewatch.machine import FEED_ANGLES, CutTable, Machine, ProgramTable
 from lobewatch.machine.journal.entries import geometry_key
 from lobewatch.machine.settings.drive_power import CutRange
@@ -68,6 +75,8 @@ class NextCut(NamedTuple):
     """Number of test cuts left."""
     cut_range: CutRange
     """Speeds and depths that machine and tool allow."""
+    asked: CutEvidence | None = None
+    """Stable cut whose verdict is asked about by name, or None."""
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:
@@ -101,11 +110,12 @@ def find_next_cut(table: ProgramTable, tool: Assembly, machine: Machine, cuts: C
     learning = learn_program(table, tool, machine, cuts)
     left = max(most - len(learning.own_cuts), 0)
     reach = CutRange.of(machine, table)
+    asked = find_cut_to_ask(learning.posterior, learning.own_cuts)
     if not left or reach.is_empty:
-        return NextCut(learning, None, left, reach)
+        return NextCut(learning, None, left, reach, asked)
     grid = build_cut_grid(table, tool, machine)
     cut = suggest_cut(learning.posterior, grid, learning.own_cuts, left, learning.rejected_cuts, table.depth_mm / 1e3)
-    return NextCut(learning, cut, left, reach)
+    return NextCut(learning, cut, left, reach, asked)
 
 
 def build_cut_grid(table: ProgramTable, tool: Assembly, machine: Machine) -> CutGrid:

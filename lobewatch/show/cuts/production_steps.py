@@ -7,7 +7,8 @@ from pathlib import Path
 
 from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, LadderStep
 from lobewatch.logbook.production import ProductionPlan
-from lobewatch.machine.settings.display_units import LENGTH, length_argument
+from lobewatch.machine.settings.display_units import LENGTH
+from lobewatch.show.cuts.suggested_cuts import observe_command, question_lines
 from lobewatch.show.programs.advice import format_rpm
 from lobewatch.show.programs.verdicts import chance_text
 from lobewatch.show.terminal.output import JsonObject
@@ -86,21 +87,14 @@ def _step_text(step: LadderStep, power: float | None) -> str:
 def _answer_lines(plan: ProductionPlan, folder: Path) -> Iterator[str]:
     """Return the question about a stable cut, or how to enter the first step."""
     asked, program = plan.ladder.questioned, plan.learning.program
-    observe = ["lobewatch", "observe", str(folder), "--program", program.name]
     if asked is not None:
-        place = f"{format_rpm(asked.speed_rpm)} rpm, {LENGTH.text(1e3 * asked.depth, '.4g')}"
-        yield f"Was {asked.id} stable at {place}? Deeper cuts chatter."
-        deep = length_argument(1e3 * asked.depth, ".4g")
-        again = shlex.join([*observe, "--speed", f"{asked.speed_rpm:g}", "--depth", deep])
-        yield f"Repeat the cut: {again} --stable (or --chatter --frequency HZ)"
-        yield f"Or exclude it: {shlex.join(['lobewatch', 'exclude', str(folder), asked.id])} --reason TEXT"
+        yield from question_lines(asked, program.name, folder)
     elif not plan.ladder.steps:
         yield f"No other cut removes more with at most {100 * MAX_CUT_RISK:g} % chance of chatter"
     elif plan.is_saved:
         step, power = plan.ladder.steps[0], plan.powers_kw[0]
-        depth = length_argument(1e3 * step.depth, ".4g")
-        place = shlex.join([*observe, "--speed", f"{step.speed_rpm:g}", "--depth", depth])
+        observe = observe_command(folder, program.name, step.speed_rpm, 1e3 * step.depth)
         shown = "" if power is None else " --power KW"
-        yield f"Enter the result: {place} --stable{shown} (or --chatter --frequency HZ)"
+        yield f"Enter the result: {observe} --stable{shown} (or --chatter --frequency HZ)"
         told = "" if power is None else "The power tells Kt. "
         yield f"{told}Stable or chatter tells the limit. A chatter frequency tells f1."

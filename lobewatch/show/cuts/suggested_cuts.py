@@ -9,6 +9,7 @@ from rich.table import Table
 
 from acquisition import Remark, merge_remarks
 from acquisition.errors import join_sentences
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence
 from lobewatch.cuts.learning.pocket_depth import MAX_POCKET_CUTS, PocketDepth
 from lobewatch.cuts.learning.posterior import inconsistent_cut_remarks
 from lobewatch.cuts.learning.program_learning import LearningResult, NextCut
@@ -97,9 +98,25 @@ def tried_depths_lines(table: ProgramTable, depths: Sequence[PocketDepth], first
 
 def observe_text(folder: Path, program: str, speed: float, depth_mm: float) -> str:
     """Return the command that enters the result of a test cut."""
-    depth = length_argument(depth_mm, ".4g")
-    observe = shlex.join(["lobewatch", "observe", str(folder), "--program", program])
-    return f"Enter the result: {observe} --speed {speed:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+    observe = observe_command(folder, program, speed, depth_mm)
+    return f"Enter the result: {observe} --stable (or --chatter --frequency HZ)"
+
+
+def observe_command(folder: Path, program: str, speed: float, depth_mm: float) -> str:
+    """Return the command that enters a cut, without its verdict."""
+    place = ["--speed", f"{speed:g}", "--depth", length_argument(depth_mm, ".4g")]
+    return shlex.join(["lobewatch", "observe", str(folder), "--program", program, *place])
+
+
+def question_lines(asked: CutEvidence, program: str, folder: Path) -> Iterator[str]:
+    """Return the question whether a cut was stable, and how to answer it with and without a cut."""
+    observe = observe_command(folder, program, asked.speed_rpm, 1e3 * asked.depth)
+    place = f"{format_rpm(asked.speed_rpm)} rpm, {LENGTH.text(1e3 * asked.depth, '.4g')}"
+    yield f"Was {asked.id} stable at {place}? Deeper cuts chatter."
+    exclude = shlex.join(["lobewatch", "exclude", str(folder), asked.id, "--reason", "wrong verdict"])
+    yield f"If it chattered: {exclude}"
+    yield f"Then: {observe} --chatter (and --frequency HZ if known)"
+    yield f"If unsure, repeat the cut: {observe} --stable (or --chatter --frequency HZ)"
 
 
 def _next_depth(depths: Sequence[PocketDepth], first: float) -> tuple[float, float] | None:
@@ -122,6 +139,7 @@ def suggestion_json(next_cut: NextCut) -> JsonObject:
     return {
         "program": learning.program.name,
         "suggested": suggested,
+        "asks": next_cut.asked and next_cut.asked.id,
         "cuts_made": len(learning.own_cuts),
         "cuts_left": next_cut.cuts_left,
         "best_heard": best and {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
@@ -133,6 +151,8 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     """Return the next test cut, how to enter it, and the best stable cut so far."""
     learning, cut = next_cut.learning, next_cut.suggestion
     program, n_made = learning.program, len(learning.own_cuts)
+    if next_cut.asked is not None:
+        yield from question_lines(next_cut.asked, program.name, folder)
     if cut is None:
         yield f"{program.name}: {_no_suggestion_text(next_cut)}"
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from typing import Any
 
 import pytest
@@ -80,10 +81,18 @@ def test_neither_and_both_verdicts_and_odd_powers_are_rejected_and_store_nothing
     assert answer(mill, "history")["cuts"] == []
 
 
-def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name(mill: Shop) -> None:
+def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name_and_corrected_without_a_cut(mill: Shop) -> None:
     for depth in (2.0, 3.0, 2.6):
         setting = find_cut_setting(mill.folder.machine, "A", None, depth)
         store_cut(mill.folder, make_observed_cut(setting, "stable" if depth == 2.0 else "chatter"))
     made = observe(mill, "--depth", "2.3", "--chatter")
     assert (made["asks"], made["next_step"]) == ("c1", None)
-    assert answer(mill, "suggest", "--program", "A")["suggested"]["repeats"] == "c1"
+    last, later = (answer(mill, "suggest", "--program", "A", "--cuts", cuts) for cuts in ("5", "6"))
+    assert (last["asks"], last["suggested"]["repeats"]) == ("c1", None)
+    assert (later["asks"], later["suggested"]["repeats"]) == ("c1", "c1")
+    lines = invoke(["suggest", str(mill.path), "--program", "A"]).stdout.splitlines()
+    assert lines[0] == "Was c1 stable at 12 900 rpm, 2 mm? Deeper cuts chatter."
+    for line in lines[1:3]:
+        invoke(shlex.split(line[line.index("lobewatch") : line.index(" (") if " (" in line else None])[1:])
+    corrected = answer(mill, "suggest", "--program", "A")
+    assert (corrected["asks"], corrected["cuts_made"], corrected["best_heard"]) == (None, 4, None)

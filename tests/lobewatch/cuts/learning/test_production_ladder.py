@@ -12,7 +12,7 @@ from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, f
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.process_damping import ProcessDamping
 from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, N_LADDER_SAMPLES, Ladder, find_ladder
-from lobewatch.cuts.learning.suggestion import CutGrid, suggest_cut
+from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
 
 
@@ -104,9 +104,12 @@ def test_three_deeper_cuts_that_chatter_put_one_stable_word_in_question(mill: Mi
     assert (found.steps, found.questioned) == ((), word)
 
 
-@pytest.mark.parametrize("left", [1, 3])
-def test_a_questioned_word_is_suggested_again_before_anything_else(mill: Mill, left: int) -> None:
+def test_a_questioned_word_is_suggested_again_while_another_cut_is_left_and_else_only_asked(mill: Mill) -> None:
     made = [stable(2e-3), *(chatter(depth) for depth in (3e-3, 2.6e-3, 2.3e-3))]
-    suggestion = suggest_cut(mill.learnt_from(made), mill.grid, made, left)
+    learnt = mill.learnt_from(made)
+    assert find_cut_to_ask(learnt, made) == made[0]
+    suggestion, last = (suggest_cut(learnt, mill.grid, made, left) for left in (3, 1))
     assert suggestion is not None
     assert (suggestion.repeats, suggestion.speed_rpm, suggestion.depth) == ("c1", 9000.0, 2e-3)
+    assert last is not None
+    assert last.repeats == ""

@@ -55,13 +55,6 @@ class PowerEvidence:
     own_error: float
     """Error of this reading only."""
 
-    def with_other_verdict(self, has_chatter: bool) -> "PowerEvidence":
-        """Return the evidence of the same power if the recorded verdict is wrong; has_chatter: that verdict."""
-        if has_chatter:
-            return replace(self, force=CHATTER_POWER_FACTOR * self.force, own_error=POWER_READING_SPREAD)
-        error = math.hypot(self.own_error, CHATTER_POWER_SPREAD)
-        return replace(self, force=self.force / CHATTER_POWER_FACTOR, own_error=error)
-
 
 def estimate_force_by_power(power: CutPower, cut: Cut, chatters: bool, days: int = 1) -> PowerEvidence:
     """Estimate Kt from the drive power of a cut in a material; days: number of days that the power is averaged over."""

@@ -5,6 +5,7 @@ with mains power or a load in per cent of another rating. Likelihoods are integr
 a wrong drive teach little, and stable and chattering cuts tell the gain in time.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,7 +15,14 @@ import scipy
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning import cut_likelihood
-from lobewatch.cuts.learning.cut_likelihood import CutEvidence
+from lobewatch.cuts.learning.cut_likelihood import (
+    CHATTER_POWER_FACTOR,
+    CHATTER_POWER_SPREAD,
+    POWER_READING_SPREAD,
+    CutEvidence,
+    PowerEvidence,
+    power_distance,
+)
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
 
 WRONG_GAIN_SHARE, WRONG_GAIN_SPREAD = 0.02, 0.35
@@ -46,17 +54,23 @@ def power_log_likelihood(cut: CutEvidence, samples: SpindleSamples, before: Sequ
 def wrong_verdict_log_ratio(cut: CutEvidence, samples: SpindleSamples, others: Sequence[CutEvidence]) -> Floats:
     """Return the log likelihood of the power of a cut if its verdict is wrong over that if it is right, shape (r,).
 
-    Chatter lowers the power, so that the power of other cuts tells a wrong verdict. 0 without a power or a verdict.
+    Chatter lowers the power, so the power of other cuts tells a wrong verdict. 0 without a power or a verdict.
     """
     if cut.power is None or not cut.has_verdict:
         return np.zeros(len(samples))
-    other = replace(cut, power=cut.power.with_other_verdict(cut.has_chatter))
-    right, wrong = (
-        power_log_likelihood(each, samples, others)
-        - np.log(cut_likelihood.power_distance(each, np.ones(1), others)[1]) / 2
-        for each in (cut, other)
+    wrong, right = (
+        power_log_likelihood(each, samples, others) - np.log(power_distance(each, np.ones(1), others)[1]) / 2
+        for each in (replace(cut, power=assume_other_verdict(cut.power, cut.has_chatter)), cut)
     )
     return np.asarray(wrong - right)
+
+
+def assume_other_verdict(power: PowerEvidence, has_chatter: bool) -> PowerEvidence:
+    """Return the evidence of a power if the verdict of its cut is wrong; has_chatter: that verdict."""
+    if has_chatter:
+        return replace(power, force=CHATTER_POWER_FACTOR * power.force, own_error=POWER_READING_SPREAD)
+    error = math.hypot(power.own_error, CHATTER_POWER_SPREAD)
+    return replace(power, force=power.force / CHATTER_POWER_FACTOR, own_error=error)
 
 
 def _by_gain(cut: CutEvidence, samples: SpindleSamples, before: Sequence[CutEvidence]) -> Floats:

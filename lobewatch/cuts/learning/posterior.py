@@ -184,7 +184,7 @@ def _cut_log_likelihood(
         return verdict + power
     wrong = cut_likelihood.mislabel_probability(cut, prediction, repeats)
     ratio = np.exp(drive_gain.wrong_verdict_log_ratio(cut, samples, before))
-    return verdict + power + np.log1p(wrong * (ratio - 1))
+    return np.asarray(verdict + power + np.log1p(wrong * (ratio - 1)))
 
 
 def _refresh(posterior: Posterior) -> Posterior:

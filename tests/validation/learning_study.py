@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Literal
 
 import numpy as np
@@ -23,8 +24,9 @@ from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, rows_at_speeds
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence
+from lobewatch.cuts.learning.drive_gain import assume_other_verdict
 from lobewatch.cuts.learning.posterior import Posterior, build_prior, find_inconsistent_cuts
-from lobewatch.cuts.learning.suggestion import CutGrid, suggest_cut
+from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
 from modal import Mode
 
@@ -58,6 +60,8 @@ class ForeignTruth:
     """Seed of the truths: 7 for those that rules were chosen on, another for those they are measured on."""
     reads_power: bool = False
     """True if the power of each cut is read."""
+    answers: bool = False
+    """True if somebody who is asked about a stable cut looks it up and answers rightly, without a cut."""
     cuts: list[CutEvidence] = field(default_factory=list)
     """Test cuts as they were written down."""
     truly_stable: list[bool] = field(default_factory=list)
@@ -101,8 +105,19 @@ class ForeignTruth:
         f, zeta, k = draw.uniform(1000, 2200), draw.uniform(0.02, 0.04), draw.uniform(1.5e7, 3e7)
         return ((f, zeta, k), (f * draw.uniform(1.35, 2.2), zeta, k * draw.uniform(1.5, 4)))[:count]
 
+    def answer(self) -> None:
+        """Correct the cut that is asked about if it chattered, without its frequency."""
+        asked = find_cut_to_ask(self.learnt, self.cuts)
+        if asked is None or self.truly_stable[place := self.cuts.index(asked)]:
+            return
+        power = None if asked.power is None else assume_other_verdict(asked.power, has_chatter=False)
+        self.cuts[place] = replace(asked, verdict="chatter", power=power)
+        self.learnt = reduce(Posterior.learn_from, self.cuts, self._before())
+
     def suggested(self) -> tuple[float, float] | None:
         """Speed (rpm) and depth (m) of the next test cut."""
+        if self.answers and self.cuts:
+            self.answer()
         grid = CutGrid(CUT, (0.0,), self.speeds, np.full(self.speeds.shape, DEEPEST), np.ones(self.speeds.shape))
         doubted = [contradicting.cut for contradicting in find_inconsistent_cuts(self.learnt)] if self.cuts else []
         suggestion = suggest_cut(self.learnt, grid, self.cuts, CUTS - len(self.cuts), doubted)

@@ -241,9 +241,9 @@ MIN_REPEAT_PROBABILITY = 0.05
 
 The last of five cuts gains 4 % of the optimum. A wrong label costs 20 %."""
 ASKED_CUT_ODDS = 3
-"""Factor on the odds that a cut is wrong that is asked about, for the last cut; chosen.
+"""Factor on the odds of a wrong verdict of the cut that is asked about, for the last cut; chosen.
 
-A last cut on the word of the asked one gains 1 or 2 % of the optimum. One that does without it gains up to 30 %."""
+If the verdict is right, the last cut gains 1 or 2 % of the optimum, if it is wrong up to 20 %."""
 MIN_EXPECTED_GAIN = 0.005
 """Smallest expected gain as a share of the best removal rate so far; chosen."""
 MIN_REMOVAL_RATE_SHARE = 1e-3
@@ -282,12 +282,13 @@ def suggest_cut(
 ) -> Suggestion | None:
     """Suggest the next test cut, or None if nothing more can be gained.
 
-    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts
-    that are rejected. One of those within the grid is made again, once, but for a stable one with the
-    last cut; and so is one whose word is doubtful enough while another is left. Else, with more than one left, a cut
-    is worth what it gains itself and what the best next one is then expected to gain; the best so far counts as its
-    chance to be right says. A diagram by the zero-order approximation proposes; what is chosen was evaluated by
-    semi-discretization. programmed: depth of the program (m); the first cut is about as deep, or chatters hardly.
+    A cut with a doubtful verdict is repeated once, a stable one only while another cut is left. Else, a cut is worth
+    its own gain and the expected gain of the best next one. The best rate so far counts where its cut is truly stable.
+    The last cut also has to gain where the stable cut that is asked about chattered. The zero-order approximation
+    proposes. Semi-discretization evaluates the chosen cut.
+
+    cuts: those of this program. left: test cuts still to be made, this one included. rejected: cuts with a rejected
+    verdict. programmed: depth of the program (m). The first cut is about as deep, or has little risk.
     """
     best = find_best_removal_rate([cut for cut in cuts if cut not in rejected])
     few = posterior.resample(N_SUGGESTION_SAMPLES)
@@ -318,8 +319,8 @@ def _find_repeat(
 ) -> CutEvidence | None:
     """Find the cut whose verdict is worth a repetition, or None.
 
-    A stable cut against which three deeper ones chatter comes first. The last cut makes none again whose "stable" is
-    rejected: that would gain nothing.
+    A stable cut against which three deeper ones chatter comes first. The last cut repeats no stable one, as that gains
+    nothing.
     """
     if left > 1 and (questioned := find_questioned_cut(cuts)) is not None:
         return questioned

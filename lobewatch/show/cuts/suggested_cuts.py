@@ -112,7 +112,7 @@ def question_lines(asked: CutEvidence, program: str, folder: Path) -> Iterator[s
     """Return the question whether a cut was stable, and how to answer it with and without a cut."""
     observe = observe_command(folder, program, asked.speed_rpm, 1e3 * asked.depth)
     place = f"{format_rpm(asked.speed_rpm)} rpm, {LENGTH.text(1e3 * asked.depth, '.4g')}"
-    yield f"Was {asked.id} stable at {place}? Deeper cuts chatter."
+    yield f"Was {asked.id} stable at {place}? The other cuts speak against it."
     exclude = shlex.join(["lobewatch", "exclude", str(folder), asked.id, "--reason", "wrong verdict"])
     yield f"If it chattered: {exclude}"
     yield f"Then: {observe} --chatter (and --frequency HZ if known)"

@@ -159,21 +159,23 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         number = f"test cut {n_made + 1} of {n_made + next_cut.cuts_left}"
         yield f"{program.name}: {format_rpm(cut.speed_rpm)} rpm, {LENGTH.text(1e3 * cut.depth, '.4g')} ({number})"
         risk = chance_text(cut.chatter_probability)
-        yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, learning)}"
+        yield f"Chance of chatter at speed: {risk}, {_suggestion_reason(cut, next_cut)}"
         yield observe_text(folder, program.name, cut.speed_rpm, 1e3 * cut.depth)
         if program.feed_per_tooth_mm is not None:
             yield "Add --power KW if the drive shows its power. lobewatch computes Kt from the power."
     best = _best_stable_cut(learning)
     if best is not None:
-        gain = f", expected gain of the next test cut {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
+        gain = f", expected gain of the next test cut {100 * cut.gain:.0f} %" if cut and 0 < cut.gain < math.inf else ""
         yield f"Best stable test cut: {LENGTH.text(1e3 * best[1], '.4g')} at {format_rpm(best[0])} rpm{gain}"
     yield "A test cut may chatter. For safe settings run lobewatch check."
 
 
-def _suggestion_reason(cut: Suggestion, learning: LearningResult) -> str:
+def _suggestion_reason(cut: Suggestion, next_cut: NextCut) -> str:
     if cut.repeats:
-        is_accepted = cut.repeats in [made.id for made in learning.accepted_cuts]
+        is_accepted = cut.repeats in [made.id for made in next_cut.learning.accepted_cuts]
         return f"the cut repeats {cut.repeats}, which {'may be wrong' if is_accepted else 'contradicts the other cuts'}"
+    if next_cut.asked is not None and cut.gain < 0:
+        return f"the cut gains if {next_cut.asked.id} chattered"
     return f"the cut determines mostly {factor_text(cut.most_informative)}"
 
 

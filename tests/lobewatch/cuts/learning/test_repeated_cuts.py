@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lobewatch.cuts.learning import suggestion
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, find_cut_to_repeat, is_setting_taken
 from lobewatch.cuts.learning.posterior import find_inconsistent_cuts
-from lobewatch.cuts.learning.suggestion import suggest_cut
+from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
 CHATTER = CutEvidence(SLOT, 9000, 12.2e-3, "chatter", 700.0, id="c2")
@@ -75,6 +76,24 @@ def test_the_last_cut_does_not_ask_for_a_stable_one_that_is_not_believed(mill: M
     learnt = mill.learnt_from([*cuts, odd])
     found = {left: suggest_cut(learnt, mill.grid, [*cuts, odd], left, [odd]) for left in (2, 1)}
     assert {left: cut.repeats for left, cut in found.items() if cut} == {2: "c2", 1: ""}
+
+
+def test_the_last_cut_gains_where_a_doubtful_stable_one_chattered(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stable far above the limit, and chatter hardly deeper: without more doubt the last cut would be deeper too."""
+    mill.force = 1.3
+    speeds = mill.grid.speeds[np.abs(np.log(mill.grid.speeds / 18000)) < 0.05]
+    grid = CutGrid(SLOT, (0.0,), speeds, np.full(speeds.shape, 0.012), np.ones(speeds.shape))
+    speed, limit = float(speeds[np.argmin(np.abs(speeds - 18000))]), mill.chatter(18000).depth
+    stable = [CutEvidence(SLOT, speed, share * limit, "stable", id=f"c{share}") for share in (0.5, 1.4)]
+    cuts = [*stable, *(mill.hear(speed, share * limit) for share in (1.82, 1.57))]
+    learnt, rates = mill.learnt_from(cuts), list[float]()
+    assert find_cut_to_ask(learnt, cuts) == stable[1]
+    for odds in (suggestion.ASKED_CUT_ODDS, 1):
+        monkeypatch.setattr(suggestion, "ASKED_CUT_ODDS", odds)
+        last = suggest_cut(learnt, grid, cuts)
+        assert last is not None
+        rates.append(last.speed_rpm * last.depth / (stable[1].speed_rpm * stable[1].depth))
+    assert rates[0] < 1 < rates[1]
 
 
 def test_a_verdict_that_is_doubtful_is_asked_for_again_once_while_another_cut_is_left(mill: Mill) -> None:

@@ -353,7 +353,10 @@ def _inconsistent_cut_remark(contradicting: InconsistentCut) -> Remark:
     at = f"at {cut.speed_rpm:.6g} rpm, {LENGTH.text(1e3 * cut.depth, '.4g')}"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     wrong = f"{100 * contradicting.wrong_probability:.0f} % likely wrong according to the other cuts"
-    kind, exclude = contradicting.contradiction, "exclude the cut with folder_updates.exclude_entry"
+    kind, exclude = (
+        contradicting.contradiction,
+        f"exclude the cut with folder_updates.exclude_entry MACHINE {cut.id} exclude_entry.reason TEXT",
+    )
     text = {
         Contradiction.FREQUENCY: f"chatter{pitch} {at} (no tool mode at this frequency: workpiece or fixture?)",
         Contradiction.CHATTERS: f"chatter{pitch} {at} ({wrong}: entry error, workpiece, fixture or worn tool?)",

@@ -24,7 +24,7 @@ from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, build_milling_system, rows_at_speeds
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence
-from lobewatch.cuts.learning.drive_gain import assume_other_verdict
+from lobewatch.cuts.learning.drive_gain import assume_chatter
 from lobewatch.cuts.learning.posterior import Posterior, build_prior, find_inconsistent_cuts
 from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from lobewatch.verdicts.uncertainty import FactorRange, Uncertainty
@@ -110,7 +110,7 @@ class ForeignTruth:
         asked = find_cut_to_ask(self.learnt, self.cuts)
         if asked is None or self.truly_stable[place := self.cuts.index(asked)]:
             return
-        power = None if asked.power is None else assume_other_verdict(asked.power, has_chatter=False)
+        power = None if asked.power is None else assume_chatter(asked.power)
         self.cuts[place] = replace(asked, verdict="chatter", power=power)
         self.learnt = reduce(Posterior.learn_from, self.cuts, self._before())
 

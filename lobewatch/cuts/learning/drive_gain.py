@@ -18,7 +18,6 @@ from lobewatch.cuts.learning import cut_likelihood
 from lobewatch.cuts.learning.cut_likelihood import (
     CHATTER_POWER_FACTOR,
     CHATTER_POWER_SPREAD,
-    POWER_READING_SPREAD,
     CutEvidence,
     PowerEvidence,
     power_distance,
@@ -51,24 +50,23 @@ def power_log_likelihood(cut: CutEvidence, samples: SpindleSamples, before: Sequ
     return np.asarray(joint - scipy.special.logsumexp(earlier, axis=-1))
 
 
-def wrong_verdict_log_ratio(cut: CutEvidence, samples: SpindleSamples, others: Sequence[CutEvidence]) -> Floats:
-    """Return the log likelihood of the power of a cut if its verdict is wrong over that if it is right, shape (r,).
+def wrong_stable_log_ratio(cut: CutEvidence, samples: SpindleSamples, others: Sequence[CutEvidence]) -> Floats:
+    """Return the log likelihood of the power of a stable cut if it chattered over that if it was stable, shape (r,).
 
-    Chatter lowers the power, so the power of other cuts tells a wrong verdict. 0 without a power or a verdict.
+    Chatter often lowers the power, so the power of other cuts tells a wrong "stable". A chattering cut may have full
+    power: 0 for other verdicts, and without a power.
     """
-    if cut.power is None or not cut.has_verdict:
+    if cut.power is None or cut.verdict != "stable":
         return np.zeros(len(samples))
-    wrong, right = (
+    chattering, stable = (
         power_log_likelihood(each, samples, others) - np.log(power_distance(each, np.ones(1), others)[1]) / 2
-        for each in (replace(cut, power=assume_other_verdict(cut.power, cut.has_chatter)), cut)
+        for each in (replace(cut, power=assume_chatter(cut.power)), cut)
     )
-    return np.asarray(wrong - right)
+    return np.asarray(chattering - stable)
 
 
-def assume_other_verdict(power: PowerEvidence, has_chatter: bool) -> PowerEvidence:
-    """Return the evidence of a power if the verdict of its cut is wrong; has_chatter: that verdict."""
-    if has_chatter:
-        return replace(power, force=CHATTER_POWER_FACTOR * power.force, own_error=POWER_READING_SPREAD)
+def assume_chatter(power: PowerEvidence) -> PowerEvidence:
+    """Return the evidence of the power of a stable cut if it chattered."""
     error = math.hypot(power.own_error, CHATTER_POWER_SPREAD)
     return replace(power, force=power.force / CHATTER_POWER_FACTOR, own_error=error)
 

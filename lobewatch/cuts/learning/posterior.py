@@ -177,13 +177,11 @@ def _cut_log_likelihood(
     """Return the log likelihood of one cut after those before it; an old cut counts less."""
     repeats = [other for other in before if cut.is_repeat_of(other)]
     verdict = cut.weight * cut_likelihood.log_likelihood(cut, prediction, repeats)
-    if cut.power is None:
-        return verdict
     power = drive_gain.power_log_likelihood(cut, samples, before)
-    if not cut.has_verdict:
+    if cut.power is None or cut.verdict != "stable":
         return verdict + power
     wrong = cut_likelihood.mislabel_probability(cut, prediction, repeats)
-    ratio = np.exp(drive_gain.wrong_verdict_log_ratio(cut, samples, before))
+    ratio = np.exp(drive_gain.wrong_stable_log_ratio(cut, samples, before))
     return np.asarray(verdict + power + np.log1p(wrong * (ratio - 1)))
 
 
@@ -281,7 +279,7 @@ def wrong_label_probability(evidence: NewEvidence) -> float:
     cut, before = evidence.cut, evidence.prior
     wrong = cut_likelihood.mislabel_probability(cut, evidence.prediction, _repeats_of(cut, before))
     others = [other for other in before.cuts if other is not cut]
-    ratio = np.exp(drive_gain.wrong_verdict_log_ratio(cut, before.samples, others))
+    ratio = np.exp(drive_gain.wrong_stable_log_ratio(cut, before.samples, others))
     return float(np.sum(before.weights * wrong * ratio / (1 - wrong + wrong * ratio)))
 
 

@@ -62,8 +62,8 @@ SPEEDS_PER_FREQUENCY_GRID = 10
 """Number of neighbouring speeds with process damping that share their frequencies."""
 DAMPED_SPINDLES_AT_ONCE = 100
 """Number of spindles with process damping computed at once, for the processor cache; measured."""
-ESTIMATED_SPINDLES_AT_ONCE = 10
-"""Number of spindles whose limits with process damping are estimated at once, for the processor cache; measured."""
+ESTIMATED_LIMITS_AT_ONCE = 1000
+"""Number of limits with process damping estimated at once, for the processor cache; measured."""
 LEVEL_STEP = 1.35
 """Ratio of two levels of process damping between which limits are interpolated; chosen."""
 NEWTON_STEPS = 14
@@ -138,26 +138,30 @@ class ZeroOrderBatch:
         return depth, chatter
 
     def estimate_limits(self, speed_rpm: Floats, deepest: float) -> tuple[Floats, Floats]:
-        """Estimate the results of `limits` at many speeds (rpm) (s,), several times faster with process damping.
+        """Estimate the results of `limits`, several times faster with process damping.
 
-        Of the limits with process damping 80 % are within 0.5 % and 98 % within 4 %, nearly all others lower.
+        Of the limits with process damping 80 % are within 1.5 % and 98 % within 5 %.
         """
-        depth, chatter = np.empty((2, len(self.rows), speed_rpm.size))
+        speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
+        depth, chatter = np.empty((2, *speeds.shape))
         damped = np.flatnonzero(self.rows.process_damping if not self.rows.cut.pitch else ())
         others = np.setdiff1d(np.arange(len(self.rows)), damped)
-        depth[others], chatter[others] = self[others].limits(speed_rpm, deepest)
-        for first in range(0, damped.size, ESTIMATED_SPINDLES_AT_ONCE):
-            few = damped[first : first + ESTIMATED_SPINDLES_AT_ONCE]
-            depth[few], chatter[few] = self[few]._estimate_damped_limits(speed_rpm, deepest)
+        depth[others], chatter[others] = self[others].limits(speeds[others], deepest)
+        size = -(-ESTIMATED_LIMITS_AT_ONCE // speeds.shape[1])
+        for few in (damped[first : first + size] for first in range(0, damped.size, size)):
+            depth[few], chatter[few] = self[few]._estimate_damped_limits(speeds[few], deepest)
         return depth, chatter
 
-    def _estimate_damped_limits(self, speed_rpm: Floats, deepest: float) -> tuple[Floats, Floats]:
+    def _estimate_damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Estimate limits and chatter frequencies with process damping of evenly spaced teeth.
 
         At a level of damping, a depth over the tooth frequency, the limits follow as without process damping, and they
         are nearly straight over the level. The true limit is at the level of its own depth.
         """
-        teeth, grid = speed_rpm * self.rows.cut.teeth / 60, self._frequency_grid()
+        teeth, near = speeds * self.rows.cut.teeth / 60, self._frequency_grid()
+        step = float(np.min(teeth)) / 2
+        even = np.arange(step, float(np.max(near)), step)
+        grid = np.sort(np.hstack((near, np.broadcast_to(even, (len(near), even.size)))), axis=1)
         parts, level = self._damped_loop.parts(grid), np.zeros((len(grid), 1))
         limit, chatter = _even_limits_at_level(grid, parts, level, teeth, deepest)
         excess, level = limit.copy(), np.min(limit / teeth, axis=1, keepdims=True)
@@ -167,9 +171,9 @@ class ZeroOrderBatch:
             row, column = (np.flatnonzero(np.any(is_open, axis=axis)) for axis in (1, 0))
             place = np.ix_(row, column)
             few = LoopParts(*(part[row] for part in parts))
-            reach = min(deepest, LEVEL_STEP**2 * float(np.max(level[row]) * np.max(teeth[column])))
-            higher, frequency = _even_limits_at_level(grid[row], few, level[row], teeth[column], reach)
-            left = higher - level[row] * teeth[column]
+            reach = min(deepest, LEVEL_STEP**2 * float(np.max(level[row] * teeth[place])))
+            higher, frequency = _even_limits_at_level(grid[row], few, level[row], teeth[place], reach)
+            left = higher - level[row] * teeth[place]
             share = np.where(higher < deepest, excess[place] / (excess[place] - np.minimum(left, 0.0)), 1.0)
             was_open = is_open[place]
             limit[place] += was_open * share * (higher - limit[place])
@@ -378,7 +382,6 @@ def _even_limits_at_level(
     grid: Floats, parts: LoopParts, level: Floats, teeth: Floats, deepest: float
 ) -> tuple[Floats, Floats]:
     """Return the limits (m) at a level (r, 1) of process damping, up to a depth, and their frequencies (Hz), (r, s)."""
-    teeth = np.broadcast_to(teeth, (len(grid), teeth.size))
     limit, chatter = _lower_limits(*(_find_even_limits(grid, loop, teeth, deepest) for loop in parts.damped(level)))
     return np.minimum(limit, deepest), chatter
 

@@ -204,6 +204,10 @@ class LimitCharts(NamedTuple):
         return float(np.max(self.expected_gains(weights, best)))
 
 
+ABSENT_DAMPING_FACTOR = 0.25
+"""Factor on the weight of samples without process damping; chosen, as nearly all cuts have some.
+
+Verdicts keep the prior of `ProcessDamping`, as they must be safe without it."""
 N_SUGGESTION_SAMPLES = 300
 """Number of samples from which chances are computed."""
 TRIED_DEPTH_SHARES = (1.0, 0.85, 0.7, 0.5, 0.35)
@@ -239,6 +243,13 @@ class Suggestion(NamedTuple):
     """Journal number of the rejected cut that it repeats; empty for a new cut."""
 
 
+def expect_process_damping(posterior: Posterior) -> Posterior:
+    """Return the posterior with less weight of the samples without process damping."""
+    damping = posterior.samples.damping
+    absent = damping.is_open & (posterior.samples.process_damping(0) <= damping.low)
+    return posterior._replace(log_weight=posterior.log_weight + np.log(ABSENT_DAMPING_FACTOR) * absent)
+
+
 def find_best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
     """Return the largest stable speed times depth (rpm m); 0 without a stable cut."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.has_chatter), default=0.0)
@@ -262,7 +273,7 @@ def suggest_cut(
     semi-discretization. programmed: depth of the program (m); the first cut is about as deep, or chatters hardly.
     """
     best = find_best_removal_rate([cut for cut in cuts if cut not in rejected])
-    few = posterior.resample(N_SUGGESTION_SAMPLES)
+    few = expect_process_damping(posterior).resample(N_SUGGESTION_SAMPLES)
     samples, chart = few.samples, LimitCharts.of(few.samples, grid)
     if (again := _find_repeat(few, [cut for cut in cuts if grid.contains(cut.speed_rpm)], left, rejected)) is not None:
         return _build_suggestion(grid, again.speed_rpm, again.depth, best, samples)._replace(repeats=again.id)

@@ -147,18 +147,18 @@ class DampedLoop:
         mixed = np.einsum("ijrk,jirk->rk", cutting, damping) - 2 * half * damped
         return LoopParts(half, damped, half**2 - _determinant(cutting), mixed, damped**2 - _determinant(damping))
 
-    def _lowest_steps(
-        self, grid: Floats, parts: LoopParts, tooth_frequency: Floats
-    ) -> tuple[Indices, Complexes]:
+    def _lowest_steps(self, grid: Floats, parts: LoopParts, tooth_frequency: Floats) -> tuple[Indices, Complexes]:
         """Return the rows (c,) and the steps (4, c) of nearly the lowest limits at tooth frequencies (r, 1)."""
         gain = mean_regeneration(self.cut, grid / tooth_frequency, np.float32)
         half, root = parts.values(gain, tooth_frequency)
         alike = root.real[:, 1:] * root.real[:, :-1] + root.imag[:, 1:] * root.imag[:, :-1] >= 0
         first, second = half.imag + root.imag < 0, half.imag - root.imag < 0
-        crosses = np.stack([
-            before[:, :-1] != np.where(alike, before[:, 1:], after[:, 1:])
-            for before, after in ((first, second), (second, first))
-        ])
+        crosses = np.stack(
+            [
+                before[:, :-1] != np.where(alike, before[:, 1:], after[:, 1:])
+                for before, after in ((first, second), (second, first))
+            ]
+        )
         branch, row, step = np.nonzero(crosses)
         at, sign = np.broadcast_to(grid, half.shape), 1.0 - 2 * branch
         same = np.where(alike[row, step], sign, -sign)

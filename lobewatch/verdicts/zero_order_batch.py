@@ -125,7 +125,6 @@ class ZeroOrderBatch:
     def _damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Return limits and chatter frequencies with process damping at speeds (rpm) (r, s)."""
         teeth, cut = speeds * self.rows.cut.teeth / 60, self.rows.cut
-
         loop, near = self._damped_loop, self._frequency_grid()
         reach = self._damped_range(near, self._receptances(near), teeth, deepest)
         order = np.argsort(np.min(teeth, axis=0))
@@ -149,7 +148,8 @@ class ZeroOrderBatch:
         depth[others], chatter[others] = self[others].limits(speeds[others], deepest)
         size = -(-ESTIMATED_LIMITS_AT_ONCE // speeds.shape[1])
         for few in (damped[first : first + size] for first in range(0, damped.size, size)):
-            depth[few], chatter[few] = self[few]._estimate_damped_limits(speeds[few], deepest)
+            spindles = ZeroOrderBatch(self.rows[few], self.force[few])
+            depth[few], chatter[few] = spindles._estimate_damped_limits(speeds[few], deepest)
         return depth, chatter
 
     def _estimate_damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:

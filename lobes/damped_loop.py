@@ -168,7 +168,7 @@ class DampedLoop:
         largest = np.zeros(len(half))
         np.minimum.at(largest, row, loop)
         few = loop < REFINED_SHARE * largest[row]
-        return row[few], np.array(steps)[:, few]
+        return row[few], np.array(steps, dtype=np.complex128)[:, few]
 
 
 def _square_root(values: Complexes) -> Complexes:

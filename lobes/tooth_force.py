@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -39,10 +40,19 @@ def interval_forces(cut: Cut, intervals: int) -> Floats:
     return np.asarray(forces)
 
 
-def mean_regeneration(cut: Cut, waves: Floats) -> Complexes:
-    """Return 1 - exp(-i w tau) averaged over all teeth, for waves in the mean tooth period (...)."""
-    delays = np.array(cut.pitch_pattern) / (2 * np.pi / cut.teeth)
-    return np.asarray(np.mean([1 - np.exp(-2j * np.pi * waves * delay) for delay in delays], axis=0))
+def mean_regeneration(cut: Cut, waves: Floats, kind: type[np.floating[Any]] = np.float64) -> Complexes:
+    """Return 1 - exp(-i w tau) averaged over all teeth, for waves in the mean tooth period (...).
+
+    kind: precision of sine and cosine. Single precision is several times faster.
+    """
+    gain = np.zeros(waves.shape, np.complex128)
+    for delay in np.array(cut.pitch_pattern) / (2 * np.pi / cut.teeth):
+        turn = waves * delay
+        half = (np.pi * (turn - np.rint(turn))).astype(kind)
+        sine, cosine = np.sin(half), np.cos(half)
+        gain.real += 2 * sine**2
+        gain.imag += 2 * sine * cosine
+    return gain / len(cut.pitch_pattern)
 
 
 def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:

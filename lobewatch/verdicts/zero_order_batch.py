@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lobes import Cut, MillingRows
-from lobes.damped_loop import DampedLoop
+from lobes.damped_loop import DampedLoop, LoopParts
 from lobes.tooth_force import interval_forces, mean_damping, mean_force, mean_regeneration, rotate_to_machine
 from lobewatch.arrays import Complexes, Flags, Floats, Indices
 
@@ -62,6 +62,10 @@ SPEEDS_PER_FREQUENCY_GRID = 10
 """Number of neighbouring speeds with process damping that share their frequencies."""
 DAMPED_SPINDLES_AT_ONCE = 100
 """Number of spindles with process damping computed at once, for the processor cache; measured."""
+ESTIMATED_LIMITS_AT_ONCE = 1000
+"""Number of limits with process damping estimated at once, for the processor cache; measured."""
+LEVEL_STEP = 1.35
+"""Ratio of two levels of process damping between which limits are interpolated; chosen."""
 NEWTON_STEPS = 14
 """Number of Newton steps for a root."""
 CONSTANT_FORCE_TOLERANCE = 1e-6
@@ -121,14 +125,8 @@ class ZeroOrderBatch:
     def _damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Return limits and chatter frequencies with process damping at speeds (rpm) (r, s)."""
         teeth, cut = speeds * self.rows.cut.teeth / 60, self.rows.cut
-
-        def receptances(frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
-            omega = 2 * np.pi * frequency
-            xy = self._receptance(omega, 0, 1) if self._is_rotated else np.zeros((1, 1), np.complex128)
-            return self._receptance(omega, 0, 0), self._receptance(omega, 1, 1), xy
-
-        loop, near = DampedLoop(cut, self.force, self.damping, receptances, self._jump), self._frequency_grid()
-        reach = self._damped_range(near, receptances(near), teeth, deepest)
+        loop, near = self._damped_loop, self._frequency_grid()
+        reach = self._damped_range(near, self._receptances(near), teeth, deepest)
         order = np.argsort(np.min(teeth, axis=0))
         depth, chatter = np.empty((2, *teeth.shape))
         for part in np.array_split(order, -(-order.size // SPEEDS_PER_FREQUENCY_GRID)):
@@ -137,6 +135,61 @@ class ZeroOrderBatch:
             grid = np.sort(np.hstack((near, np.broadcast_to(even, (len(near), even.size)))), axis=1)
             depth[:, part], chatter[:, part] = loop.limits(grid, teeth[:, part])
         return depth, chatter
+
+    def estimate_limits(self, speed_rpm: Floats, deepest: float) -> tuple[Floats, Floats]:
+        """Estimate the results of `limits`, several times faster with process damping.
+
+        Of the limits with process damping 80 % are within 1.5 % and 98 % within 5 %.
+        """
+        speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
+        depth, chatter = np.empty((2, *speeds.shape))
+        damped = np.flatnonzero(self.rows.process_damping if not self.rows.cut.pitch else ())
+        others = np.setdiff1d(np.arange(len(self.rows)), damped)
+        depth[others], chatter[others] = self[others].limits(speeds[others], deepest)
+        size = -(-ESTIMATED_LIMITS_AT_ONCE // speeds.shape[1])
+        for few in (damped[first : first + size] for first in range(0, damped.size, size)):
+            spindles = ZeroOrderBatch(self.rows[few], self.force[few])
+            depth[few], chatter[few] = spindles._estimate_damped_limits(speeds[few], deepest)
+        return depth, chatter
+
+    def _estimate_damped_limits(self, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
+        """Estimate limits and chatter frequencies with process damping of evenly spaced teeth.
+
+        At a level of damping, a depth over the tooth frequency, the limits follow as without process damping, and they
+        are nearly straight over the level. The true limit is at the level of its own depth.
+        """
+        teeth, near = speeds * self.rows.cut.teeth / 60, self._frequency_grid()
+        step = float(np.min(teeth)) / 2
+        even = np.arange(step, float(np.max(near)), step)
+        grid = np.sort(np.hstack((near, np.broadcast_to(even, (len(near), even.size)))), axis=1)
+        parts, level = self._damped_loop.parts(grid), np.zeros((len(grid), 1))
+        limit, chatter = _even_limits_at_level(grid, parts, level, teeth, deepest)
+        excess, level = limit.copy(), np.min(limit / teeth, axis=1, keepdims=True)
+        is_open = excess > 0
+        while np.any(is_open):
+            level = LEVEL_STEP * level
+            row, column = (np.flatnonzero(np.any(is_open, axis=axis)) for axis in (1, 0))
+            place = np.ix_(row, column)
+            few = LoopParts(*(part[row] for part in parts))
+            reach = min(deepest, LEVEL_STEP**2 * float(np.max(level[row] * teeth[place])))
+            higher, frequency = _even_limits_at_level(grid[row], few, level[row], teeth[place], reach)
+            left = higher - level[row] * teeth[place]
+            share = np.where(higher < deepest, excess[place] / (excess[place] - np.minimum(left, 0.0)), 1.0)
+            was_open = is_open[place]
+            limit[place] += was_open * share * (higher - limit[place])
+            chatter[place] = np.where(was_open, frequency, chatter[place])
+            excess[place], is_open[place] = left, was_open & (left > 0)
+        return limit, chatter
+
+    @property
+    def _damped_loop(self) -> DampedLoop:
+        return DampedLoop(self.rows.cut, self.force, self.damping, self._receptances, self._jump)
+
+    def _receptances(self, frequency: Floats) -> tuple[Complexes, Complexes, Complexes]:
+        """Return the receptances xx, yy and xy (m/N) at frequencies (Hz) (r, k)."""
+        omega = 2 * np.pi * frequency
+        xy = self._receptance(omega, 0, 1) if self._is_rotated else np.zeros((1, 1), np.complex128)
+        return self._receptance(omega, 0, 0), self._receptance(omega, 1, 1), xy
 
     def _damped_range(
         self, grid: Floats, receptances: tuple[Complexes, ...], teeth: Floats, deepest: float
@@ -159,13 +212,11 @@ class ZeroOrderBatch:
         grid, cut = self._frequency_grid(), self.rows.cut
         if cut.pitch:
             grid = refine_frequency_grid(grid, cut, teeth)
-        depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
-        for loop in self._eigenvalues(grid):
-            uneven = find_uneven_limits(grid, loop, cut, teeth) if cut.pitch else None
-            limit, frequency = uneven or _find_even_limits(grid, loop, teeth, deepest)
-            chatter = np.where(limit < depth, frequency, chatter)
-            depth = np.minimum(limit, depth)
-        return depth, chatter
+        found = [
+            find_uneven_limits(grid, loop, cut, teeth) if cut.pitch else _find_even_limits(grid, loop, teeth, deepest)
+            for loop in self._eigenvalues(grid)
+        ]
+        return _lower_limits(*found)
 
     def fastest_growth(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
         """Return growth (1/s) and frequency (Hz) of the fastest growing motion, at a speed (rpm) each and a depth (m).
@@ -325,6 +376,20 @@ def _find_even_limits(grid: Floats, loop: Complexes, teeth: Floats, deepest: flo
     row, speed, step, share = row[lowest], speed[lowest], step[lowest], share[lowest]
     frequency[row, speed] = grid[row, step] + share * (grid[row, step + 1] - grid[row, step])
     return depth, frequency
+
+
+def _even_limits_at_level(
+    grid: Floats, parts: LoopParts, level: Floats, teeth: Floats, deepest: float
+) -> tuple[Floats, Floats]:
+    """Return the limits (m) at a level (r, 1) of process damping, up to a depth, and their frequencies (Hz), (r, s)."""
+    limit, chatter = _lower_limits(*(_find_even_limits(grid, loop, teeth, deepest) for loop in parts.damped(level)))
+    return np.minimum(limit, deepest), chatter
+
+
+def _lower_limits(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Return the lower of two limits and its frequency."""
+    is_second = second[0] < first[0]
+    return np.where(is_second, second[0], first[0]), np.where(is_second, second[1], first[1])
 
 
 def is_force_constant(cut: Cut) -> bool:

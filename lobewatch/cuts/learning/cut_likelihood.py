@@ -351,7 +351,7 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
 def _limits_near(batch: ZeroOrderBatch, depth: float) -> tuple[Floats, Floats]:
     """Return limits (m) and chatter frequencies (Hz), with process damping only up to twice a depth (m)."""
     deepest = CLEARLY_STABLE_RATIO * depth if np.any(batch.rows.process_damping) else np.inf
-    limit, chatter = batch.limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
+    limit, chatter = batch.estimate_limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
     return limit[:, 0], chatter[:, 0]
 
 

@@ -19,7 +19,13 @@ from lobewatch.cuts.learning.cut_likelihood import (
     predict_cut,
 )
 from lobewatch.cuts.learning.posterior import Posterior
-from lobewatch.cuts.learning.suggestion import MIN_CANDIDATE_DISTANCE, CutGrid, LimitCharts, floor_depth
+from lobewatch.cuts.learning.suggestion import (
+    MIN_CANDIDATE_DISTANCE,
+    CutGrid,
+    LimitCharts,
+    expect_process_damping,
+    floor_depth,
+)
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM
 
 MAX_CUT_RISK = 0.05
@@ -32,10 +38,6 @@ N_PROPOSAL_SAMPLES, PROPOSED_SPEED_STEP = 150, 2
 """Number of samples that propose speeds, and step in the speeds of the grid; chosen."""
 N_VERIFIED_SPEEDS = 4
 """Number of speeds whose depth is verified; chosen."""
-ABSENT_DAMPING_FACTOR = 0.25
-"""Factor on the weight of samples without process damping; chosen, as nearly all cuts have some.
-
-Verdicts keep the prior of `ProcessDamping`, as they must be safe without it."""
 N_DEPTH_TRIES = 2
 """Number of depths at which the distance of the limits is computed, each by the one before; chosen."""
 MIN_STEP_GAIN = 0.03
@@ -99,7 +101,7 @@ def find_ladder(
     """
     if (questioned := find_questioned_cut(cuts)) is not None:
         return Ladder((), questioned)
-    posterior = _expect_process_damping(posterior)
+    posterior = expect_process_damping(posterior)
     steps, rate = list[LadderStep](), 0.0 if running is None else running[0] * running[1]
     while len(steps) < count:
         step = _find_step(posterior, grid, cuts, rejected, steps[-1].removal_rate if steps else rate)
@@ -111,13 +113,6 @@ def find_ladder(
         if len(steps) < count:
             posterior = posterior.learn_from(_expect(step, posterior, grid, power))
     return Ladder(tuple(steps))
-
-
-def _expect_process_damping(posterior: Posterior) -> Posterior:
-    """Return the posterior with less weight of the samples without process damping."""
-    damping = posterior.samples.damping
-    absent = damping.is_open & (posterior.samples.process_damping(0) <= damping.low)
-    return posterior._replace(log_weight=posterior.log_weight + np.log(ABSENT_DAMPING_FACTOR) * absent)
 
 
 def _expect(step: LadderStep, posterior: Posterior, grid: CutGrid, power: PowerEvidence | None) -> CutEvidence:

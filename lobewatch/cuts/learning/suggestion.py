@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lobes import Cut, MillingRows, lower_envelope, stability_boundary, zero_order_lobes
+from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning import cut_likelihood
@@ -70,30 +70,12 @@ def compare_zero_order(
     if is_force_constant(cut):
         return np.ones(speeds.shape)
     cuts = [replace(cut, feed_angle=angle) for angle in feed_angles]
-    compared = speeds[_compared_places(speeds)]
+    places = np.linspace(0, speeds.size - 1, min(N_COMPARED_SPEEDS, speeds.size))
+    compared = speeds[np.unique(places.astype(np.intp))]
     true = lower_envelope([stability_boundary(x, y, fed, compared, deepest) for fed in cuts]).depth
     mean = lower_envelope([zero_order_lobes(x, y, fed, compared) for fed in cuts]).depth
     share = np.minimum(true, deepest) / np.minimum(mean, deepest)
     return np.asarray(np.interp(speeds, compared, np.clip(share, *ZERO_ORDER_TRUST_RANGE)))
-
-
-def _compared_places(speeds: Floats) -> Indices:
-    """Return the indices of some speeds."""
-    return np.unique(np.linspace(0, speeds.size - 1, min(N_COMPARED_SPEEDS, speeds.size)).astype(np.intp))
-
-
-def _find_limits(rows: MillingRows, speeds: Floats, deepest: float) -> tuple[Floats, Floats]:
-    """Return limits (m) and chatter frequencies (Hz) of samples by the zero-order approximation, shape (r, s) each.
-
-    Process damping changes the limits as at fewer speeds, interpolated, and not the frequencies.
-    """
-    depth, chatter = ZeroOrderBatch.of(replace(rows, process_damping=np.zeros(len(rows)))).limits(speeds, deepest)
-    damped, places = np.flatnonzero(rows.process_damping), _compared_places(speeds)
-    if damped.size:
-        more = np.minimum(ZeroOrderBatch.of(rows[damped]).limits(speeds[places])[0], deepest)
-        more /= np.minimum(depth[np.ix_(damped, places)], deepest)
-        depth[damped] *= [np.interp(speeds, speeds[places], ratio) for ratio in more]
-    return depth, chatter
 
 
 MIN_STABLE_PROBABILITY = 0.5
@@ -137,7 +119,10 @@ class LimitCharts(NamedTuple):
         """Compute the limits of samples at speed."""
         rows = replace(samples.build_rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = LIMIT_DEPTH_MARGIN + float(np.max(grid.max_depths / grid.zero_order_trust))
-        fed = [_find_limits(rows.with_feed_angle(angle), grid.speeds, deepest) for angle in grid.feed_angles]
+        fed = [
+            ZeroOrderBatch.of(rows.with_feed_angle(angle)).estimate_limits(grid.speeds, deepest)
+            for angle in grid.feed_angles
+        ]
         worst = np.argmin([limit for limit, _ in fed], axis=0)[np.newaxis]
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True))
         limit = np.minimum(limit * grid.zero_order_trust, grid.max_depths)
@@ -228,6 +213,10 @@ class LimitCharts(NamedTuple):
         return float(np.max(self.expected_gains(weights, best)))
 
 
+ABSENT_DAMPING_FACTOR = 0.25
+"""Factor on the weight of samples without process damping; chosen, as nearly all cuts have some.
+
+Verdicts keep the prior of `ProcessDamping`, as they must be safe without it."""
 N_SUGGESTION_SAMPLES = 300
 """Number of samples from which chances are computed."""
 TRIED_DEPTH_SHARES = (1.0, 0.85, 0.7, 0.5, 0.35)
@@ -267,6 +256,13 @@ class Suggestion(NamedTuple):
     """Journal number of the rejected cut that it repeats; empty for a new cut."""
 
 
+def expect_process_damping(posterior: Posterior) -> Posterior:
+    """Return the posterior with less weight of the samples without process damping."""
+    damping = posterior.samples.damping
+    absent = damping.is_open & (posterior.samples.process_damping(0) <= damping.low)
+    return posterior._replace(log_weight=posterior.log_weight + np.log(ABSENT_DAMPING_FACTOR) * absent)
+
+
 def find_best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
     """Return the largest stable speed times depth (rpm m); 0 without a stable cut."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.has_chatter), default=0.0)
@@ -291,7 +287,7 @@ def suggest_cut(
     verdict. programmed: depth of the program (m). The first cut is about as deep, or has little risk.
     """
     best = find_best_removal_rate([cut for cut in cuts if cut not in rejected])
-    few = posterior.resample(N_SUGGESTION_SAMPLES)
+    few = expect_process_damping(posterior).resample(N_SUGGESTION_SAMPLES)
     samples, chart = few.samples, LimitCharts.of(few.samples, grid)
     if left <= 1 and (asked := find_cut_to_ask(posterior, cuts)) is not None:
         chart = chart.doubt(asked)

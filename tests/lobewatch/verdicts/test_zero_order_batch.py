@@ -77,3 +77,22 @@ def test_the_force_of_a_slot_with_four_teeth_is_constant_and_that_of_three_or_of
         False,
         False,
     ]
+
+
+@pytest.mark.parametrize("vectors", [None, [[0.8, 0.6], [0.3, 0.95], [-0.6, 0.8]]])
+@pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(3, 0.25, "up", 2e9, 6e8, feed_angle=0.7)])
+def test_estimates_with_process_damping_are_close_to_the_limits(cut: Cut, vectors: list[list[float]] | None) -> None:
+    """Lobes 8 to 40, spindles with and without process damping, limits up to ten times as deep."""
+    draw, speeds = np.random.default_rng(5), np.geomspace(700.0, 2600.0, 10)
+    rows = rows_at_speeds(
+        build_milling_system([replace(mode, phase_deg=0.0) for mode in X], Y, vectors), cut, np.ones(30)
+    )
+    rows.frequency[:] *= draw.uniform(0.9, 1.05, rows.frequency.shape)
+    rows = replace(rows, process_damping=np.maximum(draw.uniform(-1e7, 4e7, 30), 0.0))
+    batch, damped = ZeroOrderBatch.of(rows), rows.process_damping > 0
+    limits, estimates = batch.limits(speeds, 0.02)[0], batch.estimate_limits(speeds, 0.02)[0]
+    assert np.array_equal(estimates[~damped], limits[~damped])
+    error = np.abs(np.log(estimates[damped] / np.minimum(limits[damped], 0.02)))
+    assert np.quantile(error, 0.8) < 0.015
+    assert np.quantile(error, 0.98) < 0.05
+    assert np.max(limits[damped]) > 5 * np.max(limits[~damped])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobewatch.cuts.learning import production_ladder
+from lobewatch.cuts.learning import suggestion
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, find_questioned_cut, predict_cut
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.process_damping import ProcessDamping
@@ -53,14 +53,19 @@ def test_the_chance_of_a_step_counts_the_error_of_the_speed(mill: Mill, ladder: 
     assert np.ptp(few.at_rest.speed_rpm) > 0
 
 
-def test_the_ladder_expects_some_process_damping(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ladder_and_search_expect_some_process_damping(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:
     prior = build_prior(mill.middle, doubt(), 200, damping=ProcessDamping(0.0, 5e5, 0.02))
     speeds = np.array([1000.0, 1200.0])
     grid = CutGrid(SLOT, (0.0,), speeds, np.full(2, 0.006), np.ones(2))
     (likely,) = find_ladder(prior, grid, (), (), None, 1).steps
-    monkeypatch.setattr(production_ladder, "ABSENT_DAMPING_FACTOR", 1.0)
+    tried = suggest_cut(prior, grid, (), 5, (), 0.002)
+    monkeypatch.setattr(suggestion, "ABSENT_DAMPING_FACTOR", 1.0)
     (unlikely,) = find_ladder(prior, grid, (), (), None, 1).steps
     assert likely.removal_rate > unlikely.removal_rate
+    hardly = suggest_cut(prior, grid, (), 5, (), 0.002)
+    assert tried is not None
+    assert hardly is not None
+    assert tried.speed_rpm * tried.depth > hardly.speed_rpm * hardly.depth
 
 
 def test_no_step_gains_less_than_what_runs(mill: Mill, ladder: Ladder) -> None:

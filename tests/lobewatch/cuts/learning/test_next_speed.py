@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lobewatch.cuts.learning import sampled_lobes
 from lobewatch.cuts.learning.next_speed import HeardCut, suggest_speeds
 from lobewatch.cuts.learning.sampled_lobes import MAX_GAIN, sample_lobes
 
@@ -115,6 +116,26 @@ def test_samples_without_a_lobe_in_the_range_count_as_stable() -> None:
     assert np.all(np.min(limits[~is_free], axis=1) == 1)
     found = suggest_speeds([chatter(25_000, 200)], 4, (20_000.0, 30_000.0))
     assert all(math.isfinite(speed.relative_depth) for speed in found.speeds)
+
+
+def test_thousands_of_waves_between_two_teeth_leave_no_pocket_and_take_no_longer() -> None:
+    """One flute at 100 to 300 rpm passes 1000 to 3000 waves of 5000 Hz."""
+    limits, frequencies = sample_lobes([5000.0], 1, np.geomspace(100.0, 300.0, 220))
+    assert np.all(limits == 1)
+    assert np.all(np.abs(np.log(frequencies / 5000)) < math.log(3))
+    found = suggest_speeds([chatter(200, 5000)], 1, (100.0, 300.0))
+    assert found.speeds[0].relative_depth == pytest.approx(1)
+
+
+def test_lobes_of_many_waves_count_by_their_lowest_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    speeds = np.geomspace(4000.0, 8000.0, 60)  # 37 to 75 waves
+    lobes = sample_lobes([5000.0], 1, speeds)
+    monkeypatch.setattr(sampled_lobes, "MAX_WAVES", 1e4)
+    exact = sample_lobes([5000.0], 1, speeds)
+    assert np.max(np.abs(np.log(lobes.limits / exact.limits))) < math.log(1.2)
+    is_same = lobes.limits == exact.limits
+    assert np.array_equal(lobes.frequencies[is_same], exact.frequencies[is_same], equal_nan=True)
+    assert np.count_nonzero(is_same) > is_same.size / 4
 
 
 def test_without_a_pocket_the_next_cut_is_less_deep() -> None:

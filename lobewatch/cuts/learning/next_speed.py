@@ -38,17 +38,15 @@ SPEED_STEP = 0.005
 SPEED_UNCERTAINTY = 0.01
 """Relative standard deviation of the pocket speeds, over which chances are averaged; chosen."""
 TRIED_TOLERANCE = 0.02
-"""Relative distance in speed within which chatter at the same depth, or a smaller one, excludes a speed; chosen."""
+"""Relative distance in speed within which chatter at the newest depth, or a smaller one, excludes a speed; chosen."""
 N_SPEEDS = 3
 """Largest number of suggested speeds; chosen."""
 WINDOW_SHARE = 0.8
 """Smallest limit in the window of a pocket over that at its speed; chosen."""
 MAX_CUTS_AT_DEPTH = 3
 """Number of chattering cuts at a depth after which no speed is deep enough; chosen."""
-MIN_CUTS_BEFORE_LESS = 2
-"""Number of chattering cuts after which each next one is less deep; chosen."""
-NEXT_DEPTH_FACTOR = 0.7
-"""Next depth over one that chattered; chosen."""
+NEXT_DEPTH_FACTOR = 0.75
+"""Next depth over one that chattered; chosen on simulated cuts (docs/studies/cuts.md)."""
 
 
 class HeardCut(NamedTuple):
@@ -96,8 +94,8 @@ class NextSpeeds(NamedTuple):
     """Speeds to try next, best first, or the reason why there are none."""
 
     reason: str
-    """Code of the reason. Empty, or with a smaller depth "no-deep-speed" or "no-speed-in-range" (no pocket inside):
-    there are speeds. Without speeds: "stable" (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency"."""
+    """Code of the reason. Empty, "no-deep-speed" or "no-speed-in-range" (no pocket inside): there are speeds, all less
+    deep. Without speeds: "stable" (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency"."""
     range_rpm: tuple[float, float]
     """Slowest and fastest speed (rpm) searched."""
     speeds: tuple[NextSpeed, ...] = ()
@@ -123,7 +121,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     >>> heard = HeardCut(speed_rpm=18000.0, verdict="chatter", frequency=1370.0, depth=1e-3)
     >>> best = suggest_speeds([heard], 2, (8000.0, 24000.0)).speeds[0]
     >>> best.lobe, round(best.speed_rpm, -3), best.depth  # classic rule: 60 x 1370 / (2 x 2) = 20 550 rpm
-    (2, 20000.0, 0.001)
+    (2, 20000.0, 0.00075)
     """
     low, high = range_rpm
     if not (teeth >= 1 and 0 < low < high < math.inf):
@@ -137,7 +135,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     if not modes:
         return NextSpeeds("no-chatter-frequency", range_rpm, (), contradicting)
     reason = _find_remark(valid, modes, teeth, range_rpm)
-    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, _choose_depth(valid, reason))
+    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, _reduce_depth(valid[-1].depth))
     return NextSpeeds(reason, range_rpm, speeds, contradicting)
 
 
@@ -171,7 +169,7 @@ def _distances(frequency: float, tooth: float, known: float) -> list[tuple[float
 
 
 def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
-    """Return the code of the reason for a smaller depth; empty if it stays."""
+    """Return the code of the reason why no speed is deep enough; empty if one may be."""
     bases = [60 * frequency / teeth for frequency in modes]
     if not any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases):
         return "no-speed-in-range"
@@ -180,13 +178,10 @@ def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, r
     return "no-deep-speed" if n_tries >= MAX_CUTS_AT_DEPTH else ""
 
 
-def _choose_depth(cuts: Sequence[HeardCut], reason: str) -> float:
-    """Return the depth to try (m): that of the first cut once, then always a smaller one."""
-    depth = cuts[-1].depth
-    n_chatter = sum(cut.has_chatter for cut in cuts)
-    if not math.isfinite(depth) or (n_chatter < MIN_CUTS_BEFORE_LESS and not reason):
-        return depth
-    return round_down_depth_mm(1e3 * NEXT_DEPTH_FACTOR * depth) / 1e3
+def _reduce_depth(depth: float) -> float:
+    """Return the depth to try (m) after one that chattered; NaN if it is unknown."""
+    less = 1e3 * NEXT_DEPTH_FACTOR * depth
+    return (round_down_depth_mm(less) or less) / 1e3 if math.isfinite(less) else math.nan
 
 
 def _find_deepest_speeds(
@@ -201,19 +196,20 @@ def _find_deepest_speeds(
     chance = _average_over_speeds(_find_chance(weights, lobes.limits, depths * _relative_depth(depth, cuts)))
     newest = next(cut for cut in reversed(cuts) if cut.has_chatter)
     here = float(np.interp(newest.speed_rpm, speeds, level))
-    worst = min(float(np.interp(cut.speed_rpm, speeds, level)) for cut in cuts if cut.has_chatter)
-    score = np.where((level > worst) | np.all(level <= worst), chance, -np.inf)
-    for cut in cuts:
-        if cut.has_chatter and not cut.depth > depth / NEXT_DEPTH_FACTOR * (1 + TRIED_TOLERANCE):
-            score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
+    score = np.where(_is_worth_trying(cuts, speeds, teeth), chance, -np.inf)
     found = list[NextSpeed]()
-    if len(cuts) == 1:
-        score[~_follow_classic_rule(speeds, cuts[0].frequency, teeth)] = -np.inf
     while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
         place = int(np.argmax(score))
         found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
         score[_find_pocket(chance, place)] = -np.inf
     return tuple(found)
+
+
+def _is_worth_trying(cuts: Sequence[HeardCut], speeds: Floats, teeth: int) -> Flags:
+    """Return where no cut chattered at the newest depth or a smaller one, after one cut only near the classic rule."""
+    tried = [cut.speed_rpm for cut in cuts if cut.has_chatter and not cut.depth > cuts[-1].depth]
+    is_new = np.all([np.abs(np.log(speeds / speed)) >= TRIED_TOLERANCE for speed in tried], axis=0)
+    return is_new & _follow_classic_rule(speeds, cuts[0].frequency, teeth) if len(cuts) == 1 else is_new
 
 
 def _follow_classic_rule(speeds: Floats, frequency: float, teeth: int) -> Flags:
@@ -254,9 +250,9 @@ def _explain_frequency(cut: HeardCut, teeth: int, expected: Floats) -> Floats:
 
 
 def _find_chance(weights: Floats, limits: Floats, depths: Floats) -> Floats:
-    """Return the probability that a cut is stable at each speed, and at least half as deep as the best one."""
-    is_deep = depths >= np.minimum(np.max(limits, axis=1), MAX_LOBE_GAIN) / 2
-    return np.asarray(weights @ ((limits >= depths[:, np.newaxis]) & is_deep[:, np.newaxis]))
+    """Return the probability that a cut is stable at each speed, whose limit is at least half of the largest one."""
+    deep = np.minimum(np.max(limits, axis=1), MAX_LOBE_GAIN) / 2
+    return np.asarray(weights @ (limits >= np.maximum(depths, deep)[:, np.newaxis]))
 
 
 def _average_over_speeds(chance: Floats) -> Floats:

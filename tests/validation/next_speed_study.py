@@ -92,8 +92,9 @@ class HiddenSpindle:
         """Keep the next cut with its chatter frequency (Hz), NaN if stable, 0 if unknown, and plan another one."""
         assert self.next is not None
         speed, depth = self.next
-        verdict = "stable" if math.isnan(frequency) else "chatter"
-        self.cuts.append(HeardCut(speed, verdict, frequency or math.nan, depth))
+        self.cuts.append(
+            HeardCut(speed, "stable" if math.isnan(frequency) else "chatter", frequency or math.nan, depth)
+        )
         found = suggest_speeds(self.cuts, self.cut.teeth, (float(self.speeds[0]), float(self.speeds[-1])))
         self.next = (found.speeds[0].speed_rpm, found.speeds[0].depth) if found.speeds else None
 

@@ -45,8 +45,10 @@ WINDOW_SHARE = 0.8
 """Smallest limit in the window of a pocket over that at its speed; chosen."""
 MAX_CUTS_AT_DEPTH = 3
 """Number of chattering cuts at a depth after which no speed is deep enough; chosen."""
-NEXT_DEPTH_FACTOR = 0.75
-"""Next depth over one that chattered; chosen on simulated cuts (docs/studies/cuts.md)."""
+MIN_CUTS_BEFORE_LESS = 2
+"""Number of chattering cuts after which each next one is less deep; chosen."""
+NEXT_DEPTH_FACTOR = 0.5
+"""Next depth over one that chattered; the rule of many workshops."""
 
 
 class HeardCut(NamedTuple):
@@ -94,8 +96,8 @@ class NextSpeeds(NamedTuple):
     """Speeds to try next, best first, or the reason why there are none."""
 
     reason: str
-    """Code of the reason. Empty, "no-deep-speed" or "no-speed-in-range" (no pocket inside): there are speeds, all less
-    deep. Without speeds: "stable" (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency"."""
+    """Code of the reason. Empty, or with a smaller depth "no-deep-speed" or "no-speed-in-range" (no pocket inside):
+    there are speeds. Without speeds: "stable" (nothing left to try), "no-verdict" (no cut), "no-chatter-frequency"."""
     range_rpm: tuple[float, float]
     """Slowest and fastest speed (rpm) searched."""
     speeds: tuple[NextSpeed, ...] = ()
@@ -121,7 +123,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     >>> heard = HeardCut(speed_rpm=18000.0, verdict="chatter", frequency=1370.0, depth=1e-3)
     >>> best = suggest_speeds([heard], 2, (8000.0, 24000.0)).speeds[0]
     >>> best.lobe, round(best.speed_rpm, -3), best.depth  # classic rule: 60 x 1370 / (2 x 2) = 20 550 rpm
-    (2, 20000.0, 0.00075)
+    (2, 20000.0, 0.001)
     """
     low, high = range_rpm
     if not (teeth >= 1 and 0 < low < high < math.inf):
@@ -135,7 +137,7 @@ def suggest_speeds(cuts: Sequence[HeardCut], teeth: int, range_rpm: tuple[float,
     if not modes:
         return NextSpeeds("no-chatter-frequency", range_rpm, (), contradicting)
     reason = _find_remark(valid, modes, teeth, range_rpm)
-    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, _reduce_depth(valid[-1].depth))
+    speeds = _find_deepest_speeds(valid, modes, teeth, range_rpm, _choose_depth(valid, reason))
     return NextSpeeds(reason, range_rpm, speeds, contradicting)
 
 
@@ -169,7 +171,7 @@ def _distances(frequency: float, tooth: float, known: float) -> list[tuple[float
 
 
 def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, range_rpm: tuple[float, float]) -> str:
-    """Return the code of the reason why no speed is deep enough; empty if one may be."""
+    """Return the code of the reason for a smaller depth; empty if it stays."""
     bases = [60 * frequency / teeth for frequency in modes]
     if not any(math.floor(base / range_rpm[0]) >= max(math.ceil(base / range_rpm[1]), 1) for base in bases):
         return "no-speed-in-range"
@@ -178,10 +180,14 @@ def _find_remark(cuts: Sequence[HeardCut], modes: Sequence[float], teeth: int, r
     return "no-deep-speed" if n_tries >= MAX_CUTS_AT_DEPTH else ""
 
 
-def _reduce_depth(depth: float) -> float:
-    """Return the depth to try (m) after one that chattered; NaN if it is unknown."""
+def _choose_depth(cuts: Sequence[HeardCut], reason: str) -> float:
+    """Return the depth to try (m): that of the first cut once, then always half."""
+    depth = cuts[-1].depth
+    n_chatter = sum(cut.has_chatter for cut in cuts)
+    if not math.isfinite(depth) or (n_chatter < MIN_CUTS_BEFORE_LESS and not reason):
+        return depth
     less = 1e3 * NEXT_DEPTH_FACTOR * depth
-    return (round_down_depth_mm(less) or less) / 1e3 if math.isfinite(less) else math.nan
+    return (round_down_depth_mm(less) or less) / 1e3
 
 
 def _find_deepest_speeds(

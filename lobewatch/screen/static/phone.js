@@ -88,7 +88,7 @@ const grouped = (value) => Math.round(value).toLocaleString("en").replaceAll(","
 
 function expectation({ depth_mm: depth, relative_depth: gain, window_rpm: [low, high] }) {
   const deeper = `about ${gain < 10 ? gain.toFixed(1) : "10 or more"} times as deep as at this speed`;
-  return `try ${depth === null ? "a quarter less depth" : `${shownDepth(depth)} ${unit.name}`}, ${deeper}, best from ${grouped(low)} to ${grouped(high)} rpm`;
+  return `${depth === null ? "" : `try ${shownDepth(depth)} ${unit.name}, `}${deeper}, best from ${grouped(low)} to ${grouped(high)} rpm`;
 }
 
 function speedItem(next) {

@@ -55,9 +55,7 @@ def next_speeds_texts(found: NextSpeeds) -> Texts:
     table = new_table("speed (rpm)", f"depth ({LENGTH.unit})", "stable depth / here", "pocket (rpm)", "waves per flute")
     for speed in found.speeds:
         depth = (
-            LENGTH.number(LENGTH.round_down(1e3 * speed.depth), ".4g")
-            if math.isfinite(speed.depth)
-            else "a quarter less"
+            LENGTH.number(LENGTH.round_down(1e3 * speed.depth), ".4g") if math.isfinite(speed.depth) else "as before"
         )
         first, last = (format_rpm(round(edge)) for edge in speed.window_rpm)
         row = format_rpm(speed.speed_rpm), depth, _gain_text(speed.relative_depth), f"{first}..{last}", f"{speed.lobe}"

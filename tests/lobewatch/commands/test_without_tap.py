@@ -78,7 +78,7 @@ def test_a_file_without_a_machine_gives_chatter_and_the_next_speeds(tmp_path: Pa
     assert told["chatter_frequency_hz"] == pytest.approx(CHATTER, abs=0.2)
     assert [speed["lobe"] for speed in told["next_speeds"]] == [2, 3, 4]
     assert told["next_speeds"][0]["speed_rpm"] == pytest.approx(60 * CHATTER / 4, rel=0.025)
-    assert told["next_speeds"][0]["depth_mm"] == 0.75
+    assert told["next_speeds"][0]["depth_mm"] == 1.0
     assert "chatter at 1370" in picture.read_text("utf-8")
     unknown = json.loads(run(*arguments, "--json").stdout)
     assert unknown["range_rpm"] == [0.5 * RPM, 1.5 * RPM]

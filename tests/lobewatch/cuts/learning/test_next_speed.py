@@ -28,7 +28,7 @@ def test_the_first_speeds_are_tooth_passing_at_a_whole_share_of_the_chatter_freq
         assert speed.speed_rpm == pytest.approx(60 * 1370 / (2 * speed.lobe), rel=0.025)
         assert speed.speed_rpm <= 60 * 1370 / (2 * speed.lobe)  # f_c is above the natural frequency
         assert speed.window_rpm[0] <= speed.speed_rpm <= speed.window_rpm[1]
-        assert speed.depth == pytest.approx(0.75e-3)
+        assert speed.depth == 1e-3
     gains = [speed.relative_depth for speed in found.speeds]
     assert gains == sorted(gains, reverse=True)
     assert gains[0] > 1.5
@@ -75,8 +75,8 @@ def test_no_speed_is_tried_twice_and_then_the_depth_is_reduced() -> None:
         cuts.append(chatter(found.speeds[0].speed_rpm, 1370))
     found = suggest_speeds(cuts, 2, RANGE)
     assert found.reason == "no-deep-speed"
-    assert found.speeds[0].depth == pytest.approx(0.75e-3)
-    assert suggest_speeds([*cuts, chatter(*found.speeds[0][:1], 1370, 0.75e-3)], 2, RANGE).reason == ""
+    assert found.speeds[0].depth == pytest.approx(0.5e-3)
+    assert suggest_speeds([*cuts, chatter(*found.speeds[0][:1], 1370, 0.5e-3)], 2, RANGE).reason == ""
 
 
 def test_a_stable_cut_ends_the_search_and_a_contradicting_one_begins_it_again() -> None:
@@ -140,15 +140,15 @@ def test_lobes_of_many_waves_count_by_their_lowest_limit(monkeypatch: pytest.Mon
 
 def test_without_a_pocket_the_next_cut_is_less_deep() -> None:
     found = suggest_speeds([chatter(18000, 1370)], 2, (14500.0, 19000.0))
-    assert found.speeds[0].depth == pytest.approx(0.75e-3)
+    assert found.speeds[0].depth == pytest.approx(0.5e-3)
     assert all(14500 <= speed.speed_rpm <= 19000 for speed in found.speeds)
 
 
 @pytest.mark.parametrize(
     ("depth", "following"),
-    [(1e-3, [0.75e-3, 0.55e-3, 0.4e-3, 0.3e-3]), (0.1e-3, [0.05e-3, 0.0375e-3])],  # steps of 0.05 mm, rounded down
+    [(1e-3, [1e-3, 0.5e-3, 0.25e-3, 0.1e-3]), (0.1e-3, [0.1e-3, 0.05e-3, 0.025e-3])],  # steps of 0.05 mm, rounded down
 )
-def test_after_each_chatter_the_next_cut_is_less_deep(depth: float, following: list[float]) -> None:
+def test_from_the_second_chatter_on_each_cut_is_half_as_deep(depth: float, following: list[float]) -> None:
     cuts, depths = [chatter(18000, 1370, depth)], []
     for _ in following:
         best = suggest_speeds(cuts, 2, RANGE).speeds[0]

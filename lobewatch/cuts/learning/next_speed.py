@@ -214,7 +214,7 @@ def _find_deepest_speeds(
 def _is_worth_trying(cuts: Sequence[HeardCut], speeds: Floats, teeth: int) -> Flags:
     """Return where no cut chattered at the newest depth or a smaller one, after one cut only near the classic rule."""
     tried = [cut.speed_rpm for cut in cuts if cut.has_chatter and not cut.depth > cuts[-1].depth]
-    is_new = np.all([np.abs(np.log(speeds / speed)) >= TRIED_TOLERANCE for speed in tried], axis=0)
+    is_new: Flags = np.min([np.abs(np.log(speeds / speed)) for speed in tried], axis=0) >= TRIED_TOLERANCE
     return is_new & _follow_classic_rule(speeds, cuts[0].frequency, teeth) if len(cuts) == 1 else is_new
 
 

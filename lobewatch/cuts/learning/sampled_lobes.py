@@ -203,6 +203,6 @@ def _spread_lowest(sample: Indices, last: Indices, depth: Floats, hz: Floats, n_
     order = np.argsort(-depth)
     lowest = np.full((N_SAMPLES, n_speeds), -1)
     lowest[sample[order], last[order]] = np.arange(order.size)  # of equal places, the last one counts: the lowest
-    lowest = np.maximum.accumulate(lowest[:, ::-1], axis=1)[:, ::-1].reshape(-1)
-    place = np.flatnonzero(lowest >= 0)
-    return place, depth[order][lowest[place]], hz[order][lowest[place]]
+    spread = np.maximum.accumulate(lowest[:, ::-1], axis=1)[:, ::-1].reshape(-1)
+    place = np.flatnonzero(spread >= 0)
+    return place, depth[order][spread[place]], hz[order][spread[place]]

@@ -89,10 +89,12 @@ class HiddenSpindle:
         return MillingCut(cut.teeth, *force, depth, 1e-4, speed, x, y, runout=self.runout)
 
     def hear(self, frequency: float) -> None:
-        """Keep the next cut with its chatter frequency (Hz), NaN if stable, and plan another one."""
+        """Keep the next cut with its chatter frequency (Hz), NaN if stable, 0 if unknown, and plan another one."""
         assert self.next is not None
         speed, depth = self.next
-        self.cuts.append(HeardCut(speed, "stable" if math.isnan(frequency) else "chatter", frequency, depth))
+        self.cuts.append(
+            HeardCut(speed, "stable" if math.isnan(frequency) else "chatter", frequency or math.nan, depth)
+        )
         found = suggest_speeds(self.cuts, self.cut.teeth, (float(self.speeds[0]), float(self.speeds[-1])))
         self.next = (found.speeds[0].speed_rpm, found.speeds[0].depth) if found.speeds else None
 
@@ -113,7 +115,9 @@ def make_cuts(spindles: Sequence[HiddenSpindle], count: int) -> None:
 
 
 def hear_motion(cut: MillingCut, motion: TipMotion) -> float:
-    """Return the loudest frequency (Hz) that does not repeat from turn to turn; NaN for a stable cut."""
+    """Return the loudest frequency (Hz) that does not repeat from turn to turn; NaN if stable, 0 after an overflow."""
+    if not np.all(np.isfinite(motion.acceleration)):
+        return 0.0
     if nonperiodic_share(motion, cut, PASSAGE) < CHATTERS:
         return math.nan
     turn = round(motion.sample_rate * cut.tooth_period * cut.teeth)

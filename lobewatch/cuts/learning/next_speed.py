@@ -38,7 +38,7 @@ SPEED_STEP = 0.005
 SPEED_UNCERTAINTY = 0.01
 """Relative standard deviation of the pocket speeds, over which chances are averaged; chosen."""
 TRIED_TOLERANCE = 0.02
-"""Relative distance in speed within which chatter at the same depth, or a smaller one, excludes a speed; chosen."""
+"""Relative distance in speed within which chatter at the newest depth, or a smaller one, excludes a speed; chosen."""
 N_SPEEDS = 3
 """Largest number of suggested speeds; chosen."""
 WINDOW_SHARE = 0.8
@@ -186,7 +186,8 @@ def _choose_depth(cuts: Sequence[HeardCut], reason: str) -> float:
     n_chatter = sum(cut.has_chatter for cut in cuts)
     if not math.isfinite(depth) or (n_chatter < MIN_CUTS_BEFORE_LESS and not reason):
         return depth
-    return round_down_depth_mm(1e3 * NEXT_DEPTH_FACTOR * depth) / 1e3
+    less = 1e3 * NEXT_DEPTH_FACTOR * depth
+    return (round_down_depth_mm(less) or less) / 1e3
 
 
 def _find_deepest_speeds(
@@ -201,19 +202,20 @@ def _find_deepest_speeds(
     chance = _average_over_speeds(_find_chance(weights, lobes.limits, depths * _relative_depth(depth, cuts)))
     newest = next(cut for cut in reversed(cuts) if cut.has_chatter)
     here = float(np.interp(newest.speed_rpm, speeds, level))
-    worst = min(float(np.interp(cut.speed_rpm, speeds, level)) for cut in cuts if cut.has_chatter)
-    score = np.where((level > worst) | np.all(level <= worst), chance, -np.inf)
-    for cut in cuts:
-        if cut.has_chatter and not cut.depth > depth / NEXT_DEPTH_FACTOR * (1 + TRIED_TOLERANCE):
-            score[np.abs(np.log(speeds / cut.speed_rpm)) < TRIED_TOLERANCE] = -np.inf
+    score = np.where(_is_worth_trying(cuts, speeds, teeth), chance, -np.inf)
     found = list[NextSpeed]()
-    if len(cuts) == 1:
-        score[~_follow_classic_rule(speeds, cuts[0].frequency, teeth)] = -np.inf
     while len(found) < N_SPEEDS and np.any(np.isfinite(score)):
         place = int(np.argmax(score))
         found.append(_describe(speeds, place, level, modes, teeth, depth, math.exp(level[place] - here)))
         score[_find_pocket(chance, place)] = -np.inf
     return tuple(found)
+
+
+def _is_worth_trying(cuts: Sequence[HeardCut], speeds: Floats, teeth: int) -> Flags:
+    """Return where no cut chattered at the newest depth or a smaller one, after one cut only near the classic rule."""
+    tried = [cut.speed_rpm for cut in cuts if cut.has_chatter and not cut.depth > cuts[-1].depth]
+    is_new: Flags = np.min([np.abs(np.log(speeds / speed)) for speed in tried], axis=0) >= TRIED_TOLERANCE
+    return is_new & _follow_classic_rule(speeds, cuts[0].frequency, teeth) if len(cuts) == 1 else is_new
 
 
 def _follow_classic_rule(speeds: Floats, frequency: float, teeth: int) -> Flags:

@@ -8,14 +8,14 @@ Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Karandikar, Traverso, 
 import itertools
 from collections.abc import Iterator, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from lobes import Cut, Direction
 from lobes.tooth_force import mean_force
-from lobewatch.arrays import Complexes, Floats
+from lobewatch.arrays import Complexes, Floats, Indices
 
 N_SAMPLES, SEED = 600, 0
 """Number of samples, chosen, and the seed that makes them the same each time."""
@@ -43,8 +43,14 @@ LOWEST_FREQUENCY = 0.2
 """Lowest frequency over that of the slowest mode; chosen."""
 MAX_GAIN = 1e3
 """Largest limit over the lowest one that counts; chosen."""
+MAX_WAVES = 60
+"""Waves between two teeth above which all speeds have the lowest limit; pockets there are at most 20 % deeper."""
 GAP_SPEEDS = 13
 """Number of speeds around one that no sampled frequency reaches, of which the lowest limit counts; chosen."""
+
+
+_Points: TypeAlias = tuple[Indices, Floats, Floats]
+"""Flat places in (samples, speeds), depths in any unit and chatter frequencies (Hz)."""
 
 
 class SampledModes(NamedTuple):
@@ -173,18 +179,30 @@ def _lowest_limits(frequency: Floats, loops: Sequence[Complexes], teeth: int, sp
     return SampledLobes(np.minimum(limits / lowest, MAX_GAIN), chatter)
 
 
-def _lobe_points(
-    frequency: Floats, loop: Complexes, teeth: int, speeds: Floats
-) -> Iterator[tuple[np.ndarray[tuple[int], np.dtype[np.intp]], Floats, Floats]]:
-    """Yield each lobe: flat places in (samples, speeds), depths in any unit, chatter frequencies (Hz)."""
+def _lobe_points(frequency: Floats, loop: Complexes, teeth: int, speeds: Floats) -> Iterator[_Points]:
+    """Yield each lobe up to `MAX_WAVES`, and the lowest limits above."""
     sample, point = np.nonzero(loop.real < 0)
     response, hz = loop[sample, point], frequency[sample, point]
     depth, part = -1 / (2 * response.real), np.mod(np.angle(response) / np.pi - 0.5, 1)
     step = np.log(speeds[1] / speeds[0])
     first = np.maximum(np.ceil(60 * hz / (teeth * speeds[-1]) * np.exp(-step / 2) - part), 0)
     place, waves = np.log(60 * hz / teeth / speeds[0]) / step, part + first
+    last = np.minimum(np.floor(place - np.log(MAX_WAVES) / step), speeds.size - 1)
+    slow = np.flatnonzero(last >= 0)
+    yield _spread_lowest(sample[slow], last[slow].astype(np.intp), depth[slow], hz[slow], speeds.size)
     while depth.size:
         at = np.rint(place - np.log(np.maximum(waves, np.finfo(np.float64).tiny)) / step)
         inside = (at >= 0) & (at < speeds.size)
         yield sample[inside] * speeds.size + at[inside].astype(np.intp), depth[inside], hz[inside]
-        sample, hz, depth, place, waves = (values[at >= 0] for values in (sample, hz, depth, place, waves + 1))
+        goes_on = (at >= 0) & (waves < MAX_WAVES)
+        sample, hz, depth, place, waves = (values[goes_on] for values in (sample, hz, depth, place, waves + 1))
+
+
+def _spread_lowest(sample: Indices, last: Indices, depth: Floats, hz: Floats, n_speeds: int) -> _Points:
+    """Return the lowest of points that each cover all speeds up to a last one."""
+    order = np.argsort(-depth)
+    lowest = np.full((N_SAMPLES, n_speeds), -1)
+    lowest[sample[order], last[order]] = np.arange(order.size)  # of equal places, the last one counts: the lowest
+    spread = np.maximum.accumulate(lowest[:, ::-1], axis=1)[:, ::-1].reshape(-1)
+    place = np.flatnonzero(spread >= 0)
+    return place, depth[order][spread[place]], hz[order][spread[place]]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lobewatch.cuts.learning import sampled_lobes
 from lobewatch.cuts.learning.next_speed import HeardCut, suggest_speeds
 from lobewatch.cuts.learning.sampled_lobes import MAX_GAIN, sample_lobes
 
@@ -117,19 +118,43 @@ def test_samples_without_a_lobe_in_the_range_count_as_stable() -> None:
     assert all(math.isfinite(speed.relative_depth) for speed in found.speeds)
 
 
+def test_thousands_of_waves_between_two_teeth_leave_no_pocket_and_take_no_longer() -> None:
+    """One flute at 100 to 300 rpm passes 1000 to 3000 waves of 5000 Hz."""
+    limits, frequencies = sample_lobes([5000.0], 1, np.geomspace(100.0, 300.0, 220))
+    assert np.all(limits == 1)
+    assert np.all(np.abs(np.log(frequencies / 5000)) < math.log(3))
+    found = suggest_speeds([chatter(200, 5000)], 1, (100.0, 300.0))
+    assert found.speeds[0].relative_depth == pytest.approx(1)
+
+
+def test_lobes_of_many_waves_count_by_their_lowest_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    speeds = np.geomspace(4000.0, 8000.0, 60)  # 37 to 75 waves
+    lobes = sample_lobes([5000.0], 1, speeds)
+    monkeypatch.setattr(sampled_lobes, "MAX_WAVES", 1e4)
+    exact = sample_lobes([5000.0], 1, speeds)
+    assert np.max(np.abs(np.log(lobes.limits / exact.limits))) < math.log(1.2)
+    is_same = lobes.limits == exact.limits
+    assert np.array_equal(lobes.frequencies[is_same], exact.frequencies[is_same], equal_nan=True)
+    assert np.count_nonzero(is_same) > is_same.size / 4
+
+
 def test_without_a_pocket_the_next_cut_is_less_deep() -> None:
     found = suggest_speeds([chatter(18000, 1370)], 2, (14500.0, 19000.0))
     assert found.speeds[0].depth == pytest.approx(0.7e-3)
     assert all(14500 <= speed.speed_rpm <= 19000 for speed in found.speeds)
 
 
-def test_from_the_second_chatter_on_each_cut_is_less_deep() -> None:
-    cuts, depths = [chatter(18000, 1370)], []
-    for _ in range(4):
+@pytest.mark.parametrize(
+    ("depth", "following"),
+    [(1e-3, [1e-3, 0.7e-3, 0.45e-3, 0.3e-3]), (0.1e-3, [0.1e-3, 0.05e-3, 0.035e-3])],  # steps of 0.05 mm, rounded down
+)
+def test_from_the_second_chatter_on_each_cut_is_less_deep(depth: float, following: list[float]) -> None:
+    cuts, depths = [chatter(18000, 1370, depth)], []
+    for _ in following:
         best = suggest_speeds(cuts, 2, RANGE).speeds[0]
         cuts.append(chatter(best.speed_rpm, 1370, best.depth))
         depths.append(best.depth)
-    assert depths == pytest.approx([1e-3, 0.7e-3, 0.45e-3, 0.3e-3])  # steps of 0.05 mm, rounded down
+    assert depths == pytest.approx(following)
 
 
 def test_a_later_stable_cut_does_not_outweigh_chatter() -> None:

@@ -5,14 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lobewatch.arrays import Floats
+from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection import load_ripple
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_windows import KnownCut
 from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
-from lobewatch.cuts.chatter_detection.spectrum import Spectrum
+from lobewatch.cuts.chatter_detection.spectrum import SpectralPeaks, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
 MIN_CHATTER_ENERGY = 5e-4
@@ -23,6 +24,8 @@ MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
+MIN_BEYOND_RIPPLE = 0.5
+"""The same for peaks where a stable cut with ripple has few: sharp edges reach them with up to a seventh; chosen."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 FLIP_TOLERANCE = 0.003
@@ -52,6 +55,14 @@ class CutAxis(NamedTuple):
     """Radial depth of cut over diameter (-)."""
     known: KnownCut
     """Facts from other windows of the cut."""
+    ripple: Ripple | None
+    """Ripple of all axes; None if the cut is steady."""
+
+    def is_beyond_ripple(self, peaks: SpectralPeaks) -> Flags:
+        """Return whether each peak is where the ripple of a stable cut puts none."""
+        if self.ripple is None:
+            return np.zeros(len(peaks), dtype=np.bool_)
+        return ~self.ripple.explains(peaks.frequency, self.turn, self.spectrum.bin_width)
 
     @property
     def turn(self) -> float:
@@ -119,12 +130,26 @@ def _evaluate_unexplained(axis: CutAxis, sound: CutEvaluation, peaks: PeaksByOri
         return _evaluate_stable(axis, sound, peaks)
     if ratio < least_energy(chatter):
         return sound._replace(verdict="cannot tell", reason="faint")
-    if not classification.has_sidebands(left, chatter, axis.turn, bin_width):
-        return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
-    if classification.is_other_source(left, chatter, axis.turn, bin_width, ratio < MIN_SINGLE_PEAK_ENERGY):
-        return sound._replace(verdict="cannot tell", reason="other-source")
+    chatter, reason = _choose_family(axis, left, chatter, ratio < MIN_SINGLE_PEAK_ENERGY)
+    if reason:
+        tone = chatter.frequency if reason == "unexplained-tone" else np.nan
+        return sound._replace(verdict="cannot tell", reason=reason, tone=tone)
     half = abs(chatter.frequency / axis.tooth % 1 - 0.5) < FLIP_TOLERANCE
     return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
+
+
+def _choose_family(axis: CutAxis, left: SpectralPeaks, named: ChatterPeaks, is_faint: bool) -> tuple[ChatterPeaks, str]:
+    """Choose the named family of peaks, or else the loudest, with the reason why it is no chatter; empty if it is."""
+    turn, bin_width = axis.turn, axis.spectrum.bin_width
+    reasons = []
+    for family in (named, classification.find_loudest_family(left, axis.tooth, bin_width)):
+        if not classification.has_sidebands(left, family, turn, bin_width):
+            reasons.append("unexplained-tone")
+        elif classification.is_other_source(left, family, turn, axis.teeth, bin_width, is_faint):
+            reasons.append("other-source")
+        else:
+            return family, ""
+    return named, reasons[0]
 
 
 def least_energy(chatter: ChatterPeaks) -> float:
@@ -145,8 +170,10 @@ def _remove_ripple(axis: CutAxis, peaks: PeaksByOrigin) -> PeaksByOrigin:
     left = peaks.unexplained[peaks.unexplained.frequency >= axis.known.lowest]
     if len(left) and len(peaks.comb):
         is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, axis.spectrum, axis.turn)
-        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
-        left = left[~is_ripple]
+        ripple, rest = left[is_ripple].energy, left[~is_ripple]
+        beyond = rest[axis.is_beyond_ripple(rest)].energy
+        is_more = rest.energy > MIN_CHATTER_OVER_RIPPLE * ripple or beyond > MIN_BEYOND_RIPPLE * ripple
+        left = rest[np.full(len(rest), is_more)]
     return peaks._replace(unexplained=left)
 
 

@@ -33,6 +33,8 @@ MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
 """Evenness of steady chatter, and least energy over that of the comb of any other, or where the speed ripples; chosen.
 
 Side bands of ripple, amplified by a mode, have up to a tenth."""
+MIN_SHARE_BEYOND_RIPPLE = 0.5
+"""Share of the energy of chatter where a stable cut with ripple has nothing, above which it is chatter; chosen."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 
@@ -81,9 +83,10 @@ def evaluate_cut(
         return speed
     even, spectra, quiet, speed, ripple = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
-    axes = [CutAxis(one, spectrum, speed, teeth, immersion, known) for one, spectrum in zip(even, spectra, strict=True)]
+    about = speed, teeth, immersion, known, ripple
+    axes = [CutAxis(one, spectrum, *about) for one, spectrum in zip(even, spectra, strict=True)]
     sounds = [evaluate_axis(*each)._replace(axis=i) for i, each in enumerate(zip(axes, gaps, quiet, strict=True))]
-    sounds = [_compare_with_ripple(sound, even, ripple) for sound in _compare_axes(sounds)]
+    sounds = [_compare_with_ripple(sound, axes[sound.axis]) for sound in _compare_axes(sounds)]
     sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
     tooth = speed.frequency * teeth
     if speed == known.speed and sound.chatter and classification.has_other_spacing(sound.chatter, tooth):
@@ -125,13 +128,15 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
     return compared
 
 
-def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
+def _compare_with_ripple(sound: CutEvaluation, axis: CutAxis) -> CutEvaluation:
     """Compare chatter with ripple in a stable cut: its side bands, and modes that ring after each rib."""
-    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None or sound.peaks is None:
+    if sound.chatter is None or sound.peaks is None:
         return sound
-    about = sound.spectrum, sound.peaks.air.frequency, sound.spindle_speed.frequency
-    evenness = load_ripple.compute_evenness(even[sound.axis], *about)
-    is_even = evenness > MIN_STEADY_EVENNESS and not (ripple and ripple.speed)
+    peaks = sound.chatter.peaks
+    if peaks[axis.is_beyond_ripple(peaks)].energy > MIN_SHARE_BEYOND_RIPPLE * peaks.energy:
+        return sound
+    evenness = load_ripple.compute_evenness(axis.signal, axis.spectrum, sound.peaks.air.frequency, axis.turn)
+    is_even = evenness > MIN_STEADY_EVENNESS and not (axis.ripple and axis.ripple.speed)
     if evenness > MAX_PULSE_EVENNESS and (is_even or sound.energy_ratio > MIN_UNEVEN_ENERGY):
         return sound
     return sound._replace(verdict="cannot tell", reason="faint", chatter=None)

@@ -38,6 +38,17 @@ class Ripple(NamedTuple):
     speed: float
     """Amplitude of the spindle speed over its mean."""
 
+    def explains(self, frequency: Floats, turn: float, bin_width: float) -> Flags:
+        """Return whether each frequency is some ripples away from a near multiple of the spindle frequency; in Hz.
+
+        All that a stable cut with a steady ripple does, modes that ring after each rib too, is there.
+        """
+        steps = np.arange(-np.ceil(MAX_SIDEBAND_DISTANCE / turn), np.ceil(MAX_SIDEBAND_DISTANCE / turn) + 1)
+        beyond = frequency - turn * (np.round(frequency / turn) + steps[:, np.newaxis])
+        away = np.abs(beyond - self.frequency * np.round(beyond / self.frequency))
+        near = (np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (away < spectral.PEAK_TOLERANCE * bin_width)
+        return np.asarray(np.any(near, axis=0))
+
 
 class Envelopes(NamedTuple):
     """Multiples of the spindle frequency as they change in time."""
@@ -171,7 +182,9 @@ def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
     total = float(np.sum(power))
     if not inside[best] or float(np.sum(power[near])) <= MIN_RIPPLE_SHARE * total:
         return 0.0, 0.0
-    return float(frequency[best]), float(np.sqrt(2) * np.std(values))
+    before, top, after = np.log(np.maximum(power[best - 1 : best + 2], np.finfo(np.float64).tiny))
+    place = best + 0.5 * (before - after) / min(before - 2 * top + after, -1e-12)
+    return float(place * frequency[1]), float(np.sqrt(2) * np.std(values))
 
 
 RESAMPLING_FACTOR = 3

@@ -24,30 +24,34 @@ MIN_STEADINESS_PEAKS = 3
 def estimate_unsteadiness(
     signal: Floats, sample_rate: float, peaks: SpectralPeaks, turning: SpindleSpeed, bin_width: float
 ) -> float:
-    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
+    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz).
+
+    Peaks that are off in all parts alike are no harmonics.
+    """
     order = np.round(peaks.frequency / turning.frequency)
     reach = bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
     comb = (np.abs(peaks.frequency - order * turning.frequency) < reach) & (order > 1)
     loudest = peaks[comb].loudest(N_STEADINESS_PEAKS)
-    if not len(loudest):
-        return spectral.MIN_UNSTEADINESS
-    orders = np.round(loudest.frequency / turning.frequency)
-    changes = []
-    for part in np.array_split(signal, N_STEADINESS_PARTS):
-        heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
-        if heard.size:
-            nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
-            changes.append(_speed_change(nearest / (orders * turning.frequency) - 1))
-    return max(spectral.MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
+    changes = np.zeros(1)
+    if len(loudest):
+        expected = np.round(loudest.frequency / turning.frequency) * turning.frequency
+        found = [_speed_change(part, sample_rate, expected) for part in np.array_split(signal, N_STEADINESS_PARTS)]
+        changes = np.array([change for change in found if np.isfinite(change)] or [0.0])
+    change = UNSTEADINESS_FACTOR * np.max(np.abs(changes - np.median(changes)))
+    return float(np.clip(change, spectral.MIN_UNSTEADINESS, MAX_UNSTEADINESS))
 
 
-def _speed_change(off: Floats) -> float:
-    """Return the speed change that most harmonics of one part agree on, else 0; off: relative, of each."""
+def _speed_change(part: Floats, sample_rate: float, expected: Floats) -> float:
+    """Return the relative speed change that most harmonics, expected at some Hz, agree on in a part, else NaN."""
+    heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
+    if not heard.size:
+        return np.nan
+    off = heard[np.argmin(np.abs(heard[:, np.newaxis] - expected), axis=0)] / expected - 1
     near = off[np.abs(off) < MAX_UNSTEADINESS]
     if near.size < max(MIN_STEADINESS_PEAKS, off.size / 2):
-        return 0.0
+        return np.nan
     low, middle, high = np.quantile(near, [0.25, 0.5, 0.75])
-    return abs(float(middle)) if high - low < abs(middle) else 0.0
+    return float(middle) if high - low < max(abs(middle), spectral.MIN_UNSTEADINESS) else np.nan
 
 
 AIR_PIECE_LENGTH = 0.5
@@ -275,8 +279,20 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
     large = energy / np.max(energy)
     score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
     best = families[int(np.argmax(score))]
-    top = int(np.argmax(np.where(best, named, 0.0)))
-    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[best & part])
+    return _build_family(left, best, int(np.argmax(np.where(best, named, 0.0))), bin_width)
+
+
+def find_loudest_family(left: SpectralPeaks, tooth_frequency: float, bin_width: float) -> ChatterPeaks:
+    """Find the family of the loudest peak, in Hz; left: at least one peak."""
+    top = int(np.argmax(left.amplitude))
+    apart = spectral.sideband_distance(left.frequency, float(left.frequency[top]), tooth_frequency)
+    return _build_family(left, apart < spectral.PEAK_TOLERANCE * bin_width, top, bin_width)
+
+
+def _build_family(left: SpectralPeaks, family: Flags, top: int, bin_width: float) -> ChatterPeaks:
+    """Build the family of a peak without its faint members."""
+    part = family & (left.amplitude > MIN_FAMILY_AMPLITUDE * np.max(left.amplitude))
+    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[part])
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:
@@ -306,12 +322,16 @@ MIN_OWN_HARMONICS, MAX_OWN_HARMONICS = 4, 12
 """Smallest number of harmonics, and highest one, by which a tone is that of another machine; chosen."""
 
 
-def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
-    """Return whether chatter has more harmonics than side bands, as tooth passing of another spindle has; in Hz."""
+def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, tooth_frequency: float, bin_width: float) -> bool:
+    """Return whether chatter has more harmonics than they have side bands, as another spindle has; in Hz.
+
+    Chatter that leaves the cut has harmonics with side bands one tooth passing away.
+    """
     order = np.round(left.frequency / chatter.frequency)
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
     is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
-    return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1))
+    is_explained = _find_explained(left, chatter.frequency, tooth_frequency, bin_width) > 0
+    return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, np.count_nonzero(is_explained & ~is_own) + 1))
 
 
 MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
@@ -322,22 +342,20 @@ MIN_SIDEBANDS = 3
 """Number of peaks of a sideband family that proves chatter."""
 
 
-def is_other_source(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float, is_faint: bool) -> bool:
-    """Return whether most unexplained peaks are no chatter, of which weak evidence needs a larger share; in Hz."""
-    is_weak = is_faint or len(chatter.peaks) < MIN_SIDEBANDS or has_own_comb(left, chatter, bin_width)
-    share = share_of_chatter(left, chatter, turn, bin_width)
-    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
+def is_other_source(
+    left: SpectralPeaks, chatter: ChatterPeaks, turn: float, teeth: int, bin_width: float, is_faint: bool
+) -> bool:
+    """Return whether most unexplained peaks are no chatter, of which weak evidence needs a larger share; in Hz.
 
-
-def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:
-    """Return the energy of chatter, with the ripple of its lines, over that of all peaks; in Hz.
-
-    Harmonics of the chatter frequency count unless they are the comb of another spindle.
+    The ripple of its lines counts as chatter, its harmonics too unless they are the comb of another spindle.
     """
     is_chatter = np.any(np.abs(left.frequency[:, np.newaxis] - chatter.peaks.frequency) < RIPPLE_DISTANCE, axis=1)
-    if not has_own_comb(left, chatter, bin_width):
+    is_comb = has_own_comb(left, chatter, teeth * turn, bin_width)
+    if not is_comb:
         is_chatter |= _find_explained(left, chatter.frequency, turn, bin_width) > 0
-    return left[is_chatter].energy / left.energy
+    is_weak = is_faint or len(chatter.peaks) < MIN_SIDEBANDS or is_comb
+    least = MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE
+    return left[is_chatter].energy < least * left.energy
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_width: float) -> Floats:

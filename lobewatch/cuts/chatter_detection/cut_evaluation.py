@@ -35,6 +35,8 @@ MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
 Side bands of ripple, amplified by a mode, have up to a tenth."""
 MIN_SHARE_BEYOND_RIPPLE = 0.5
 """Share of the energy of chatter where a stable cut with ripple has nothing, above which it is chatter; chosen."""
+MAX_DISTANT_MISFIT = 25.0
+"""Misfit of a speed more than 2 % off the set one, above which it may be that of music; chosen: a quarter is off."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 
@@ -149,7 +151,9 @@ def _find_speed(
     if measured_rpm is None:
         speed = spindle_speed.find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if speed is not None:
-            return speed
+            is_near = abs(speed.frequency / commanded - 1) < spindle_speed.VOTE_SPEED_TOLERANCE
+            is_trusted = is_near or speed.misfit < MAX_DISTANT_MISFIT
+            return speed if is_trusted else _speed_not_found(spectra[0], 60 * speed.frequency)
         distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded, None, None)
         if np.isfinite(distant):
             return _speed_not_found(spectra[0], distant)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lobewatch.arrays import Flags, Floats
+from lobewatch.arrays import Floats
 from lobewatch.cuts.chatter_detection import load_ripple
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
@@ -58,12 +58,6 @@ class CutAxis(NamedTuple):
     ripple: Ripple | None
     """Ripple of all axes; None if the cut is steady."""
 
-    def is_beyond_ripple(self, peaks: SpectralPeaks) -> Flags:
-        """Return whether each peak is where the ripple of a stable cut puts none."""
-        if self.ripple is None:
-            return np.zeros(len(peaks), dtype=np.bool_)
-        return ~self.ripple.explains(peaks.frequency, self.turn, self.spectrum.bin_width)
-
     @property
     def turn(self) -> float:
         """Spindle frequency (Hz)."""
@@ -106,7 +100,8 @@ def _evaluate_peaks(axis: CutAxis, peaks: PeaksByOrigin) -> CutEvaluation:
     """Evaluate an axis with classified peaks."""
     spectrum, speed, teeth = axis.spectrum, axis.speed, axis.teeth
     peaks = _remove_ripple(axis, peaks)
-    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
+    found = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks)
+    sound = found._replace(spectrum=spectrum, ripple=axis.ripple)
     n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
     if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
         return sound._replace(verdict="cannot tell", reason="slow-sampling")
@@ -171,7 +166,7 @@ def _remove_ripple(axis: CutAxis, peaks: PeaksByOrigin) -> PeaksByOrigin:
     if len(left) and len(peaks.comb):
         is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, axis.spectrum, axis.turn)
         ripple, rest = left[is_ripple].energy, left[~is_ripple]
-        beyond = rest[axis.is_beyond_ripple(rest)].energy
+        beyond = axis.ripple.energy_beyond(rest, axis.turn, axis.spectrum.bin_width) if axis.ripple else 0.0
         is_more = rest.energy > MIN_CHATTER_OVER_RIPPLE * ripple or beyond > MIN_BEYOND_RIPPLE * ripple
         left = rest[np.full(len(rest), is_more)]
     return peaks._replace(unexplained=left)

@@ -16,7 +16,7 @@ from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.axis_evaluation import MIN_COMB_ENERGY, CutAxis, evaluate_axis, least_energy
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts, trim_overload
 from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
-from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_peaks, rank_evidence
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_peaks, is_beyond_ripple, rank_evidence
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
@@ -33,8 +33,6 @@ MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
 """Evenness of steady chatter, and least energy over that of the comb of any other, or where the speed ripples; chosen.
 
 Side bands of ripple, amplified by a mode, have up to a tenth."""
-MIN_SHARE_BEYOND_RIPPLE = 0.5
-"""Share of the energy of chatter where a stable cut with ripple has nothing, above which it is chatter; chosen."""
 MAX_DISTANT_MISFIT = 25.0
 """Misfit of a speed more than 2 % off the set one, above which it may be that of music; chosen: a quarter is off."""
 MIN_CHATTER_MODE_SHARE = 0.5
@@ -89,7 +87,7 @@ def evaluate_cut(
     axes = [CutAxis(one, spectrum, *about) for one, spectrum in zip(even, spectra, strict=True)]
     sounds = [evaluate_axis(*each)._replace(axis=i) for i, each in enumerate(zip(axes, gaps, quiet, strict=True))]
     sounds = [_compare_with_ripple(sound, axes[sound.axis]) for sound in _compare_axes(sounds)]
-    sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
+    sound = max(sounds, key=rank_evidence)
     tooth = speed.frequency * teeth
     if speed == known.speed and sound.chatter and classification.has_other_spacing(sound.chatter, tooth):
         return _speed_not_found(sound.spectrum or spectra[0], np.nan)
@@ -132,10 +130,7 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
 
 def _compare_with_ripple(sound: CutEvaluation, axis: CutAxis) -> CutEvaluation:
     """Compare chatter with ripple in a stable cut: its side bands, and modes that ring after each rib."""
-    if sound.chatter is None or sound.peaks is None:
-        return sound
-    peaks = sound.chatter.peaks
-    if peaks[axis.is_beyond_ripple(peaks)].energy > MIN_SHARE_BEYOND_RIPPLE * peaks.energy:
+    if sound.chatter is None or sound.peaks is None or is_beyond_ripple(sound):
         return sound
     evenness = load_ripple.compute_evenness(axis.signal, axis.spectrum, sound.peaks.air.frequency, axis.turn)
     is_even = evenness > MIN_STEADY_EVENNESS and not (axis.ripple and axis.ripple.speed)

@@ -38,16 +38,17 @@ class Ripple(NamedTuple):
     speed: float
     """Amplitude of the spindle speed over its mean."""
 
-    def explains(self, frequency: Floats, turn: float, bin_width: float) -> Flags:
-        """Return whether each frequency is some ripples away from a near multiple of the spindle frequency; in Hz.
+    def energy_beyond(self, peaks: SpectralPeaks, turn: float, bin_width: float) -> float:
+        """Return the energy of peaks that are no ripples away from a near multiple of the spindle frequency; in Hz.
 
-        All that a stable cut with a steady ripple does, modes that ring after each rib too, is there.
+        A stable cut with a steady ripple, and its modes that ring after each rib, have next to none there.
         """
-        steps = np.arange(-np.ceil(MAX_SIDEBAND_DISTANCE / turn), np.ceil(MAX_SIDEBAND_DISTANCE / turn) + 1)
-        beyond = frequency - turn * (np.round(frequency / turn) + steps[:, np.newaxis])
+        reach = np.ceil(MAX_SIDEBAND_DISTANCE / turn)
+        orders = np.round(peaks.frequency / turn) + np.arange(-reach, reach + 1)[:, np.newaxis]
+        beyond = peaks.frequency - turn * orders
         away = np.abs(beyond - self.frequency * np.round(beyond / self.frequency))
-        near = (np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (away < spectral.PEAK_TOLERANCE * bin_width)
-        return np.asarray(np.any(near, axis=0))
+        is_ripple = (np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (away < spectral.PEAK_TOLERANCE * bin_width)
+        return peaks[~np.any(is_ripple, axis=0)].energy
 
 
 class Envelopes(NamedTuple):
@@ -183,8 +184,8 @@ def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
     if not inside[best] or float(np.sum(power[near])) <= MIN_RIPPLE_SHARE * total:
         return 0.0, 0.0
     before, top, after = np.log(np.maximum(power[best - 1 : best + 2], np.finfo(np.float64).tiny))
-    place = best + 0.5 * (before - after) / min(before - 2 * top + after, -1e-12)
-    return float(place * frequency[1]), float(np.sqrt(2) * np.std(values))
+    shift = 0.5 * (before - after) / min(before - 2 * top + after, -abs(before - after), -1e-12)
+    return float((best + shift) * frequency[1]), float(np.sqrt(2) * np.std(values))
 
 
 RESAMPLING_FACTOR = 3

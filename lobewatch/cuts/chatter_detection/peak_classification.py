@@ -17,6 +17,8 @@ MAX_UNSTEADINESS = 2e-3
 """Largest relative speed change that is searched."""
 UNSTEADINESS_FACTOR = 3.0
 """Speed variation over that of the means of the parts, as speed also varies within a part; chosen."""
+MAX_STEADY_CHANGE = 0.5
+"""Difference of the parts over their change below which this is no change, but the peaks are no harmonics; chosen."""
 MIN_STEADINESS_PEAKS = 3
 """Smallest number of harmonics that must show the same change."""
 
@@ -32,26 +34,29 @@ def estimate_unsteadiness(
     reach = bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
     comb = (np.abs(peaks.frequency - order * turning.frequency) < reach) & (order > 1)
     loudest = peaks[comb].loudest(N_STEADINESS_PEAKS)
-    changes = np.zeros(1)
-    if len(loudest):
-        expected = np.round(loudest.frequency / turning.frequency) * turning.frequency
-        found = [_speed_change(part, sample_rate, expected) for part in np.array_split(signal, N_STEADINESS_PARTS)]
-        changes = np.array([change for change in found if np.isfinite(change)] or [0.0])
-    change = UNSTEADINESS_FACTOR * np.max(np.abs(changes - np.median(changes)))
-    return float(np.clip(change, spectral.MIN_UNSTEADINESS, MAX_UNSTEADINESS))
+    if not len(loudest):
+        return spectral.MIN_UNSTEADINESS
+    orders = np.round(loudest.frequency / turning.frequency)
+    off = []
+    for part in np.array_split(signal, N_STEADINESS_PARTS):
+        heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
+        if heard.size:
+            nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
+            off.append(nearest / (orders * turning.frequency) - 1)
+    usual = np.array([np.median(of_part) for of_part in off])
+    if usual.size and np.ptp(usual) < MAX_STEADY_CHANGE * np.min(np.abs(usual)):
+        return spectral.MIN_UNSTEADINESS
+    changes = [_speed_change(of_part) for of_part in off]
+    return max(spectral.MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
 
 
-def _speed_change(part: Floats, sample_rate: float, expected: Floats) -> float:
-    """Return the relative speed change that most harmonics, expected at some Hz, agree on in a part, else NaN."""
-    heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
-    if not heard.size:
-        return np.nan
-    off = heard[np.argmin(np.abs(heard[:, np.newaxis] - expected), axis=0)] / expected - 1
+def _speed_change(off: Floats) -> float:
+    """Return the speed change that most harmonics of one part agree on, else 0; off: relative, of each."""
     near = off[np.abs(off) < MAX_UNSTEADINESS]
     if near.size < max(MIN_STEADINESS_PEAKS, off.size / 2):
-        return np.nan
+        return 0.0
     low, middle, high = np.quantile(near, [0.25, 0.5, 0.75])
-    return float(middle) if high - low < max(abs(middle), spectral.MIN_UNSTEADINESS) else np.nan
+    return abs(float(middle)) if high - low < abs(middle) else 0.0
 
 
 AIR_PIECE_LENGTH = 0.5
@@ -307,10 +312,15 @@ MAX_SPACING_DIFFERENCE = 2e-3
 
 def has_other_spacing(chatter: ChatterPeaks, tooth_frequency: float) -> bool:
     """Return whether the side bands of chatter are not one tooth passing (Hz) apart, so that its speed is wrong."""
-    order = np.round((chatter.peaks.frequency - chatter.frequency) / tooth_frequency)
+    found = chatter.peaks.frequency
+    is_mirrored = fold_frequency(found + chatter.frequency, tooth_frequency) < fold_frequency(
+        found - chatter.frequency, tooth_frequency
+    )
+    frequency = np.where(is_mirrored, -found, found)
+    order = np.round((frequency - chatter.frequency) / tooth_frequency)
     if not np.ptp(order):
         return False
-    spacing = float(np.polyfit(order, chatter.peaks.frequency, 1)[0])
+    spacing = float(np.polyfit(order, frequency, 1)[0])
     return abs(spacing / tooth_frequency - 1) > MAX_SPACING_DIFFERENCE
 
 

@@ -89,8 +89,9 @@ def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: fl
     if speed is not None and speed.misfit < MAX_SPEED_MISFIT:
         return speed
     plain = _find_speed(spectra, air, teeth, commanded, RIPPLE_DISTANCE)
-    found = [each for each in (speed, plain) if each is not None]
-    return min(found, key=lambda each: each.misfit, default=None)
+    if speed is None or plain is None or _count_same(plain, [speed]):
+        return speed or plain
+    return min(speed, plain, key=lambda each: each.misfit)
 
 
 def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> SpindleSpeed | None:

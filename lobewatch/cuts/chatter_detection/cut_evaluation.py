@@ -33,8 +33,6 @@ MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
 """Evenness of steady chatter, and least energy over that of the comb of any other, or where the speed ripples; chosen.
 
 Side bands of ripple, amplified by a mode, have up to a tenth."""
-MAX_DISTANT_MISFIT = 25.0
-"""Misfit of a speed more than 2 % off the set one, above which it may be that of music; chosen: a quarter is off."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
 
@@ -81,6 +79,8 @@ def evaluate_cut(
     speed = followed or _find_speed(spectra, quiet, *asked)
     if isinstance(speed, CutEvaluation):
         return speed
+    if known.shop and abs(60 * speed.frequency / commanded_rpm - 1) > spindle_speed.VOTE_SPEED_TOLERANCE:
+        return _speed_not_found(spectra[0], 60 * speed.frequency)  # notes of music fit combs up to 5 % away
     even, spectra, quiet, speed, ripple = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
     about = speed, teeth, immersion, known, ripple
@@ -146,9 +146,7 @@ def _find_speed(
     if measured_rpm is None:
         speed = spindle_speed.find_speed_of_spectra(spectra, quiet, teeth, commanded)
         if speed is not None:
-            is_near = abs(speed.frequency / commanded - 1) < spindle_speed.VOTE_SPEED_TOLERANCE
-            is_trusted = is_near or speed.misfit < MAX_DISTANT_MISFIT
-            return speed if is_trusted else _speed_not_found(spectra[0], 60 * speed.frequency)
+            return speed
         distant = 60 * spindle_speed.find_distant_speed(spectra, quiet, teeth, commanded, None, None)
         if np.isfinite(distant):
             return _speed_not_found(spectra[0], distant)

@@ -1,5 +1,6 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ MAX_UNSTEADINESS = 2e-3
 UNSTEADINESS_FACTOR = 3.0
 """Speed variation over that of the means of the parts, as speed also varies within a part; chosen."""
 MAX_STEADY_CHANGE = 0.5
-"""Difference of the parts over their change below which this is no change, but the peaks are no harmonics; chosen."""
+"""Largest difference of the parts and distance of some peaks over that of most, which are no harmonics then; chosen."""
 MIN_STEADINESS_PEAKS = 3
 """Smallest number of harmonics that must show the same change."""
 
@@ -28,7 +29,7 @@ def estimate_unsteadiness(
 ) -> float:
     """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz).
 
-    Peaks that are off in all parts alike are no harmonics.
+    Peaks that are off in all parts alike, while others are not, are no harmonics.
     """
     order = np.round(peaks.frequency / turning.frequency)
     reach = bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
@@ -43,11 +44,17 @@ def estimate_unsteadiness(
         if heard.size:
             nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
             off.append(nearest / (orders * turning.frequency) - 1)
-    usual = np.array([np.median(of_part) for of_part in off])
-    if usual.size and np.ptp(usual) < MAX_STEADY_CHANGE * np.min(np.abs(usual)):
+    if _are_off_apart(off):
         return spectral.MIN_UNSTEADINESS
     changes = [_speed_change(of_part) for of_part in off]
     return max(spectral.MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
+
+
+def _are_off_apart(off: Sequence[Floats]) -> bool:
+    """Return whether most peaks are off in all parts alike, but others are not; off: relative, of each in each part."""
+    usual = np.array([np.median(of_part) for of_part in off])
+    least = MAX_STEADY_CHANGE * np.min(np.abs(usual), initial=np.inf)
+    return bool(off and np.ptp(usual) < least and max(np.min(np.abs(of_part)) for of_part in off) < least)
 
 
 def _speed_change(off: Floats) -> float:

@@ -137,7 +137,8 @@ def _choose_family(axis: CutAxis, left: SpectralPeaks, named: ChatterPeaks, is_f
     """Choose the named family of peaks, or else the loudest, with the reason why it is no chatter; empty if it is."""
     turn, bin_width = axis.turn, axis.spectrum.bin_width
     reasons = []
-    for family in (named, classification.find_loudest_family(left, axis.tooth, bin_width)):
+    loudest = classification.find_loudest_family(left, axis.tooth, bin_width)
+    for family in (named, loudest) if len(loudest.peaks) >= classification.MIN_SIDEBANDS else (named,):
         if not classification.has_sidebands(left, family, turn, bin_width):
             reasons.append("unexplained-tone")
         elif classification.is_other_source(left, family, turn, axis.teeth, bin_width, is_faint):

@@ -295,10 +295,11 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
 
 
 def find_loudest_family(left: SpectralPeaks, tooth_frequency: float, bin_width: float) -> ChatterPeaks:
-    """Find the family of the loudest peak, in Hz; left: at least one peak."""
+    """Find the family of the loudest peak without faint side bands, in Hz; left: at least one peak."""
     top = int(np.argmax(left.amplitude))
     apart = spectral.sideband_distance(left.frequency, float(left.frequency[top]), tooth_frequency)
-    return _build_family(left, apart < spectral.PEAK_TOLERANCE * bin_width, top, bin_width)
+    is_loud = left.amplitude > MIN_CHATTER_AMPLITUDE * left.amplitude[top]
+    return _build_family(left, is_loud & (apart < spectral.PEAK_TOLERANCE * bin_width), top, bin_width)
 
 
 def _build_family(left: SpectralPeaks, family: Flags, top: int, bin_width: float) -> ChatterPeaks:
@@ -339,16 +340,21 @@ MIN_OWN_HARMONICS, MAX_OWN_HARMONICS = 4, 12
 """Smallest number of harmonics, and highest one, by which a tone is that of another machine; chosen."""
 
 
+MIN_SIDEBAND_ENERGY = 1e-2
+"""Energy of side bands over that of a tone and its harmonics, below which it is of another machine; chosen."""
+
+
 def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, tooth_frequency: float, bin_width: float) -> bool:
-    """Return whether chatter has more harmonics than they have side bands, as another spindle has; in Hz.
+    """Return whether chatter has harmonics with hardly any side bands, as another spindle has; in Hz.
 
     Chatter that leaves the cut has harmonics with side bands one tooth passing away.
     """
     order = np.round(left.frequency / chatter.frequency)
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
-    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
-    is_explained = _find_explained(left, chatter.frequency, tooth_frequency, bin_width) > 0
-    return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, np.count_nonzero(is_explained & ~is_own) + 1))
+    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 0) & (order <= MAX_OWN_HARMONICS)
+    is_sideband = (_find_explained(left, chatter.frequency, tooth_frequency, bin_width) > 0) & ~is_own
+    is_comb = np.count_nonzero(is_own) > MIN_OWN_HARMONICS
+    return bool(is_comb and left[is_sideband].energy < MIN_SIDEBAND_ENERGY * left[is_own].energy)
 
 
 MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85

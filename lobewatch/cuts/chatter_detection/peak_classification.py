@@ -345,7 +345,7 @@ MIN_SIDEBAND_ENERGY = 1e-2
 
 
 def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, tooth_frequency: float, bin_width: float) -> bool:
-    """Return whether chatter has harmonics with hardly any side bands, as another spindle has; in Hz.
+    """Return whether chatter has more harmonics than side bands, and these are faint, as another spindle has; in Hz.
 
     Chatter that leaves the cut has harmonics with side bands one tooth passing away.
     """
@@ -353,7 +353,7 @@ def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, tooth_frequency: fl
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
     is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 0) & (order <= MAX_OWN_HARMONICS)
     is_sideband = (_find_explained(left, chatter.frequency, tooth_frequency, bin_width) > 0) & ~is_own
-    is_comb = np.count_nonzero(is_own) > MIN_OWN_HARMONICS
+    is_comb = np.count_nonzero(is_own) > max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1)
     return bool(is_comb and left[is_sideband].energy < MIN_SIDEBAND_ENERGY * left[is_own].energy)
 
 

@@ -13,26 +13,18 @@ from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection import load_ripple, spindle_speed
 from lobewatch.cuts.chatter_detection import peak_classification as classification
 from lobewatch.cuts.chatter_detection import spectrum as spectral
+from lobewatch.cuts.chatter_detection.axis_evaluation import MIN_COMB_ENERGY, CutAxis, evaluate_axis, least_energy
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts, trim_overload
 from lobewatch.cuts.chatter_detection.cut_windows import MIN_CHATTER_FREQUENCY, NOTHING_KNOWN, KnownCut
-from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_peaks, rank_evidence
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, group_peaks, is_beyond_ripple, rank_evidence
 from lobewatch.cuts.chatter_detection.load_ripple import Ripple
 from lobewatch.cuts.chatter_detection.pass_detection import find_cuts_in_shop
-from lobewatch.cuts.chatter_detection.peak_classification import ChatterPeaks, PeaksByOrigin
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, Spectrum
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import MAX_COMB_PEAKS, SpindleSpeed, refine_comb
 from lobewatch.cuts.chatter_detection.window_evaluation import evaluate_windows
 
 __all__ = ["CutEvaluation", "CutRecording", "evaluate_cut", "evaluate_recording", "group_peaks"]
 
-MIN_CHATTER_ENERGY = 5e-4
-"""Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
-MIN_SINGLE_PEAK_ENERGY = 1e-2
-"""Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
-MAX_STABLE_ENERGY = 2e-4
-"""Energy of unexplained peaks over that of the comb, below which a cut is stable."""
-MIN_CHATTER_OVER_RIPPLE = 1.5
-"""Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
 MAX_PULSE_EVENNESS = 0.58
 """Evenness of the power of unexplained peaks below which they are modes that ring after each rib; chosen.
 
@@ -43,18 +35,6 @@ MIN_STEADY_EVENNESS, MIN_UNEVEN_ENERGY = 0.9, 0.1
 Side bands of ripple, amplified by a mode, have up to a tenth."""
 MIN_CHATTER_MODE_SHARE = 0.5
 """Lowest frequency of chatter over that of the lowest mode; chosen."""
-MIN_COMB_ENERGY = 1e-9
-"""Smallest energy assumed for the comb, over that of unexplained peaks."""
-FLIP_TOLERANCE = 0.003
-"""Distance from half the tooth passing frequency, relative to that, within which chatter is of period two (flip)."""
-MAX_UNEVEN_ENERGY = 5.0
-"""Energy of orders without run-out (modulo the teeth neither 0 nor +-1) over that of orders with run-out, at most."""
-MAX_RUNOUT_ENERGY = 8.0
-"""Largest energy of all other orders over that of tooth passing, in a cut narrower than a slot."""
-SLOT_IMMERSION = 0.95
-"""Immersion above which tooth passing nearly vanishes (-)."""
-END_PEAK_TOLERANCE = 1.0
-"""Distance up to which a peak at the end of a cut matches one of the whole cut (bins)."""
 
 
 def evaluate_cut(
@@ -99,13 +79,15 @@ def evaluate_cut(
     speed = followed or _find_speed(spectra, quiet, *asked)
     if isinstance(speed, CutEvaluation):
         return speed
+    if known.shop and abs(60 * speed.frequency / commanded_rpm - 1) > spindle_speed.VOTE_SPEED_TOLERANCE:
+        return _speed_not_found(spectra[0], 60 * speed.frequency)  # notes of music fit combs up to 5 % away
     even, spectra, quiet, speed, ripple = _even_speed(np.atleast_2d(cut), spectra, quiet, speed)
     gaps = [[gap[i] for gap in known.shop] or [axis] for i, axis in enumerate(np.atleast_2d(air))]
-    axes = zip(even, gaps, spectra, quiet, strict=True)
-    about = speed, teeth, immersion, known
-    sounds = [_evaluate_axis(*axis, *about)._replace(axis=i) for i, axis in enumerate(axes)]
-    sounds = [_compare_with_ripple(sound, even, ripple) for sound in _compare_axes(sounds)]
-    sound = max(sounds, key=rank_evidence)._replace(ripple=ripple)
+    about = speed, teeth, immersion, known, ripple
+    axes = [CutAxis(one, spectrum, *about) for one, spectrum in zip(even, spectra, strict=True)]
+    sounds = [evaluate_axis(*each)._replace(axis=i) for i, each in enumerate(zip(axes, gaps, quiet, strict=True))]
+    sounds = [_compare_with_ripple(sound, axes[sound.axis]) for sound in _compare_axes(sounds)]
+    sound = max(sounds, key=rank_evidence)
     tooth = speed.frequency * teeth
     if speed == known.speed and sound.chatter and classification.has_other_spacing(sound.chatter, tooth):
         return _speed_not_found(sound.spectrum or spectra[0], np.nan)
@@ -141,59 +123,20 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
     for i, (sound, comb) in enumerate(zip(sounds, combs, strict=True)):
         if sound.chatter is not None and comb < loudest:
             ratio = sound.energy_ratio * max(comb, MIN_COMB_ENERGY * loudest) / loudest
-            if ratio < _least_energy(sound.chatter):
+            if ratio < least_energy(sound.chatter):
                 compared[i] = sound._replace(verdict="cannot tell", reason="faint", chatter=None, energy_ratio=ratio)
     return compared
 
 
-def _compare_with_ripple(sound: CutEvaluation, even: Floats, ripple: Ripple | None) -> CutEvaluation:
+def _compare_with_ripple(sound: CutEvaluation, axis: CutAxis) -> CutEvaluation:
     """Compare chatter with ripple in a stable cut: its side bands, and modes that ring after each rib."""
-    if sound.chatter is None or sound.spindle_speed is None or sound.spectrum is None or sound.peaks is None:
+    if sound.chatter is None or sound.peaks is None or is_beyond_ripple(sound):
         return sound
-    about = sound.spectrum, sound.peaks.air.frequency, sound.spindle_speed.frequency
-    evenness = load_ripple.compute_evenness(even[sound.axis], *about)
-    is_even = evenness > MIN_STEADY_EVENNESS and not (ripple and ripple.speed)
+    evenness = load_ripple.compute_evenness(axis.signal, axis.spectrum, sound.peaks.air.frequency, axis.turn)
+    is_even = evenness > MIN_STEADY_EVENNESS and not (axis.ripple and axis.ripple.speed)
     if evenness > MAX_PULSE_EVENNESS and (is_even or sound.energy_ratio > MIN_UNEVEN_ENERGY):
         return sound
     return sound._replace(verdict="cannot tell", reason="faint", chatter=None)
-
-
-def _least_energy(chatter: ChatterPeaks) -> float:
-    """Return the smallest energy of unexplained peaks over that of the comb that is chatter."""
-    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= classification.MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
-
-
-def _evaluate_axis(
-    cut: Floats,
-    air: Sequence[Floats],
-    spectrum: Spectrum,
-    quiet: Spectrum,
-    speed: SpindleSpeed,
-    teeth: int,
-    immersion: float,
-    known: KnownCut,
-) -> CutEvaluation:
-    """Evaluate one axis; a tone without sidebands is searched in pieces of the air, too."""
-    peaks = spectral.find_separate_peaks(spectrum)
-    unsteady = classification.estimate_unsteadiness(cut, spectrum.sample_rate, peaks, speed, spectrum.bin_width)
-
-    def evaluate(quiet: Spectrum) -> CutEvaluation:
-        by_origin = classification.classify_peaks(peaks, spectrum, quiet, speed, teeth, unsteady)
-        return _evaluate_peaks(by_origin, spectrum, speed, cut, teeth, immersion, known)
-
-    sound = evaluate(quiet)
-    is_searched = sound.verdict != "stable" if known.shop else sound.reason == "unexplained-tone"
-    if is_searched and sound.peaks is not None:
-        for gap in air:
-            quiet = classification.add_air_tones(quiet, gap, sound.peaks.unexplained.frequency)
-        sound = evaluate(quiet)
-    if not known.shop or sound.reason != "faint" or sound.peaks is None:
-        return sound
-    left, tooth = sound.peaks.unexplained, speed.frequency * teeth
-    chatter = classification.find_chatter_peaks(left, tooth, spectrum.bin_width)
-    if classification.has_sidebands(left, chatter, speed.frequency, spectrum.bin_width):
-        return sound
-    return _evaluate_stable(sound._replace(verdict="stable", reason=""), sound.peaks, teeth, immersion)
 
 
 def _find_speed(
@@ -232,93 +175,6 @@ def _evaluate_without_air(spectra: Spectra, teeth: int, commanded: float) -> Cut
 def _speed_not_found(spectrum: Spectrum, distant: float) -> CutEvaluation:
     """Return the evaluation of a cut whose speed is not near the commanded one; elsewhere: a speed that fits (rpm)."""
     return CutEvaluation("cannot tell", "speed-not-found", spectrum=spectrum, distant_rpm=distant)
-
-
-def _evaluate_peaks(
-    peaks: PeaksByOrigin,
-    spectrum: Spectrum,
-    speed: SpindleSpeed,
-    signal: Floats,
-    teeth: int,
-    immersion: float,
-    known: KnownCut,
-) -> CutEvaluation:
-    """Evaluate an axis with classified peaks."""
-    peaks = _remove_ripple(peaks, spectrum, speed, known.lowest)
-    sound = CutEvaluation("stable", "", spindle_speed=speed, energy_ratio=0.0, peaks=peaks, spectrum=spectrum)
-    n_harmonics = np.count_nonzero(peaks.tooth_order == 0) + len(peaks.folded)
-    if classification.is_undersampled(spectrum, speed, teeth) and n_harmonics < classification.MIN_TOOTH_HARMONICS:
-        return sound._replace(verdict="cannot tell", reason="slow-sampling")
-    other = classification.find_other_teeth(peaks.comb, speed, teeth)
-    found = _evaluate_unexplained(sound, peaks, spectrum, speed, signal, other or teeth, immersion, known)
-    if not other or found.reason == "other-source":
-        return found
-    return sound._replace(verdict="cannot tell", reason="teeth-contradicted", comb_teeth=other)
-
-
-def _evaluate_unexplained(
-    sound: CutEvaluation,
-    peaks: PeaksByOrigin,
-    spectrum: Spectrum,
-    speed: SpindleSpeed,
-    signal: Floats,
-    teeth: int,
-    immersion: float,
-    known: KnownCut,
-) -> CutEvaluation:
-    """Evaluate the unexplained peaks of an axis; sound: as if it was stable."""
-    if not len(peaks.unexplained):
-        return _evaluate_stable(sound, peaks, teeth, immersion)
-    tooth = speed.frequency * teeth
-    chatter = classification.find_chatter_peaks(peaks.unexplained, tooth, spectrum.bin_width)
-    still = 1.0 if known.is_begun else _share_at_end(chatter, signal, spectrum.sample_rate)
-    ratio = still * peaks.unexplained.energy / max(peaks.comb.energy, MIN_COMB_ENERGY * peaks.unexplained.energy)
-    sound = sound._replace(energy_ratio=ratio)
-    if ratio < MAX_STABLE_ENERGY:
-        return _evaluate_stable(sound, peaks, teeth, immersion)
-    if ratio < _least_energy(chatter):
-        return sound._replace(verdict="cannot tell", reason="faint")
-    if not classification.has_sidebands(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width):
-        return sound._replace(verdict="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
-    is_faint = ratio < MIN_SINGLE_PEAK_ENERGY
-    if classification.is_other_source(peaks.unexplained, chatter, speed.frequency, spectrum.bin_width, is_faint):
-        return sound._replace(verdict="cannot tell", reason="other-source")
-    half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP_TOLERANCE
-    return sound._replace(verdict="flip" if half else "chatter", chatter=chatter)
-
-
-def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:
-    """Return the power of chatter in the second half of a window over that in all of it, at most 1."""
-    end = spectral.compute_spectrum(signal[signal.size // 2 :], sample_rate)
-    power = float(end.max_power_near(np.array([chatter.frequency]), END_PEAK_TOLERANCE)[0])
-    at = int(np.argmin(np.abs(chatter.peaks.frequency - chatter.frequency)))
-    return min(power / float(chatter.peaks.amplitude[at] ** 2), 1.0)
-
-
-def _remove_ripple(peaks: PeaksByOrigin, spectrum: Spectrum, speed: SpindleSpeed, lowest: float) -> PeaksByOrigin:
-    """Remove side bands of ripple, and what is below the lowest frequency of chatter (Hz), from unexplained peaks."""
-    left = peaks.unexplained[peaks.unexplained.frequency >= lowest]
-    if len(left) and len(peaks.comb):
-        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, spectrum, speed.frequency)
-        is_ripple |= left[~is_ripple].energy < MIN_CHATTER_OVER_RIPPLE * left[is_ripple].energy
-        left = left[~is_ripple]
-    return peaks._replace(unexplained=left)
-
-
-def _evaluate_stable(sound: CutEvaluation, peaks: PeaksByOrigin, teeth: int, immersion: float) -> CutEvaluation:
-    """Evaluate as stable, unless few harmonics are heard, or louder ones than runout and uneven teeth make them."""
-    if (
-        sound.spectrum
-        and sound.spindle_speed
-        and classification.is_narrow(peaks, sound.spectrum, sound.spindle_speed, teeth)
-    ):
-        return sound._replace(verdict="cannot tell", reason="slow-sampling")
-    power, order = peaks.comb.amplitude**2, peaks.tooth_order
-    tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
-    uneven = float(np.sum(power[~run_out & ~tooth]))
-    is_odd = uneven > max(MAX_UNEVEN_ENERGY * np.sum(power[run_out & ~tooth]), MAX_STABLE_ENERGY * np.sum(power))
-    is_loud = immersion < SLOT_IMMERSION and np.sum(power[~tooth]) > MAX_RUNOUT_ENERGY * np.sum(power[tooth])
-    return sound._replace(verdict="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
 class CutRecording(NamedTuple):

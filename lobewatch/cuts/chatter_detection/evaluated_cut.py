@@ -68,3 +68,11 @@ def rank_evidence(sound: CutEvaluation) -> tuple[bool, float]:
     """Rank an evaluation of an axis or a window: chatter first, then by energy."""
     peaks = sound.chatter.peaks if sound.chatter else sound.peaks and sound.peaks.comb
     return sound.chatter is not None, peaks.energy if peaks else 0.0
+
+
+def is_beyond_ripple(sound: CutEvaluation) -> bool:
+    """Return whether most of the energy of chatter is where the ripple of a stable cut puts nothing."""
+    if sound.chatter is None or sound.spectrum is None or sound.spindle_speed is None or sound.ripple is None:
+        return False
+    peaks, turn = sound.chatter.peaks, sound.spindle_speed.frequency
+    return sound.ripple.energy_beyond(peaks, turn, sound.spectrum.bin_width) > 0.5 * peaks.energy

@@ -38,6 +38,18 @@ class Ripple(NamedTuple):
     speed: float
     """Amplitude of the spindle speed over its mean."""
 
+    def energy_beyond(self, peaks: SpectralPeaks, turn: float, bin_width: float) -> float:
+        """Return the energy of peaks that are no ripples away from a near multiple of the spindle frequency; in Hz.
+
+        A stable cut with a steady ripple, and its modes that ring after each rib, have next to none there.
+        """
+        reach = np.ceil(MAX_SIDEBAND_DISTANCE / turn)
+        orders = np.round(peaks.frequency / turn) + np.arange(-reach, reach + 1)[:, np.newaxis]
+        beyond = peaks.frequency - turn * orders
+        away = np.abs(beyond - self.frequency * np.round(beyond / self.frequency))
+        is_ripple = (np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (away < spectral.PEAK_TOLERANCE * bin_width)
+        return peaks[~np.any(is_ripple, axis=0)].energy
+
 
 class Envelopes(NamedTuple):
     """Multiples of the spindle frequency as they change in time."""
@@ -171,7 +183,9 @@ def _main_swing(values: Floats, rate: float) -> tuple[float, float]:
     total = float(np.sum(power))
     if not inside[best] or float(np.sum(power[near])) <= MIN_RIPPLE_SHARE * total:
         return 0.0, 0.0
-    return float(frequency[best]), float(np.sqrt(2) * np.std(values))
+    before, top, after = np.log(np.maximum(power[best - 1 : best + 2], np.finfo(np.float64).tiny))
+    shift = 0.5 * (before - after) / min(before - 2 * top + after, -abs(before - after), -1e-12)
+    return float((best + shift) * frequency[1]), float(np.sqrt(2) * np.std(values))
 
 
 RESAMPLING_FACTOR = 3

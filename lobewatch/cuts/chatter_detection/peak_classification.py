@@ -1,5 +1,6 @@
 """Classify spectral peaks: spindle harmonics, air, folded harmonics and chatter."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ MAX_UNSTEADINESS = 2e-3
 """Largest relative speed change that is searched."""
 UNSTEADINESS_FACTOR = 3.0
 """Speed variation over that of the means of the parts, as speed also varies within a part; chosen."""
+MAX_STEADY_CHANGE = 0.5
+"""Largest difference of the parts and distance of some peaks over that of most, which are no harmonics then; chosen."""
 MIN_STEADINESS_PEAKS = 3
 """Smallest number of harmonics that must show the same change."""
 
@@ -24,7 +27,10 @@ MIN_STEADINESS_PEAKS = 3
 def estimate_unsteadiness(
     signal: Floats, sample_rate: float, peaks: SpectralPeaks, turning: SpindleSpeed, bin_width: float
 ) -> float:
-    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz)."""
+    """Estimate the relative variation of the spindle speed in a cut, from its peaks and their bin width (Hz).
+
+    Peaks that are off in all parts alike, while others are not, are no harmonics.
+    """
     order = np.round(peaks.frequency / turning.frequency)
     reach = bin_width + MAX_UNSTEADINESS * peaks.frequency / UNSTEADINESS_FACTOR
     comb = (np.abs(peaks.frequency - order * turning.frequency) < reach) & (order > 1)
@@ -32,13 +38,23 @@ def estimate_unsteadiness(
     if not len(loudest):
         return spectral.MIN_UNSTEADINESS
     orders = np.round(loudest.frequency / turning.frequency)
-    changes = []
+    off = []
     for part in np.array_split(signal, N_STEADINESS_PARTS):
         heard = find_peaks(spectral.compute_spectrum(part, sample_rate)).frequency
         if heard.size:
             nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
-            changes.append(_speed_change(nearest / (orders * turning.frequency) - 1))
+            off.append(nearest / (orders * turning.frequency) - 1)
+    if _are_off_apart(off):
+        return spectral.MIN_UNSTEADINESS
+    changes = [_speed_change(of_part) for of_part in off]
     return max(spectral.MIN_UNSTEADINESS, min(UNSTEADINESS_FACTOR * max(changes, default=0.0), MAX_UNSTEADINESS))
+
+
+def _are_off_apart(off: Sequence[Floats]) -> bool:
+    """Return whether most peaks are off in all parts alike, but others are not; off: relative, of each in each part."""
+    usual = np.array([np.median(of_part) for of_part in off])
+    least = MAX_STEADY_CHANGE * np.min(np.abs(usual), initial=np.inf)
+    return bool(off and np.ptp(usual) < least and max(np.min(np.abs(of_part)) for of_part in off) < least)
 
 
 def _speed_change(off: Floats) -> float:
@@ -275,8 +291,21 @@ def find_chatter_peaks(left: SpectralPeaks, tooth_frequency: float, bin_width: f
     large = energy / np.max(energy)
     score = np.where(large >= MIN_FAMILY_ENERGY, explained / np.max(explained) + DISPLACEMENT_WEIGHT * large, 0.0)
     best = families[int(np.argmax(score))]
-    top = int(np.argmax(np.where(best, named, 0.0)))
-    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[best & part])
+    return _build_family(left, best, int(np.argmax(np.where(best, named, 0.0))), bin_width)
+
+
+def find_loudest_family(left: SpectralPeaks, tooth_frequency: float, bin_width: float) -> ChatterPeaks:
+    """Find the family of the loudest peak without faint side bands, in Hz; left: at least one peak."""
+    top = int(np.argmax(left.amplitude))
+    apart = spectral.sideband_distance(left.frequency, float(left.frequency[top]), tooth_frequency)
+    is_loud = left.amplitude > MIN_CHATTER_AMPLITUDE * left.amplitude[top]
+    return _build_family(left, is_loud & (apart < spectral.PEAK_TOLERANCE * bin_width), top, bin_width)
+
+
+def _build_family(left: SpectralPeaks, family: Flags, top: int, bin_width: float) -> ChatterPeaks:
+    """Build the family of a peak without its faint members."""
+    part = family & (left.amplitude > MIN_FAMILY_AMPLITUDE * np.max(left.amplitude))
+    return ChatterPeaks(float(left.frequency[top]), float(left.frequency_error(bin_width)[top]), left[part])
 
 
 def has_sidebands(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> bool:
@@ -291,10 +320,15 @@ MAX_SPACING_DIFFERENCE = 2e-3
 
 def has_other_spacing(chatter: ChatterPeaks, tooth_frequency: float) -> bool:
     """Return whether the side bands of chatter are not one tooth passing (Hz) apart, so that its speed is wrong."""
-    order = np.round((chatter.peaks.frequency - chatter.frequency) / tooth_frequency)
+    found = chatter.peaks.frequency
+    is_mirrored = fold_frequency(found + chatter.frequency, tooth_frequency) < fold_frequency(
+        found - chatter.frequency, tooth_frequency
+    )
+    frequency = np.where(is_mirrored, -found, found)
+    order = np.round((frequency - chatter.frequency) / tooth_frequency)
     if not np.ptp(order):
         return False
-    spacing = float(np.polyfit(order, chatter.peaks.frequency, 1)[0])
+    spacing = float(np.polyfit(order, frequency, 1)[0])
     return abs(spacing / tooth_frequency - 1) > MAX_SPACING_DIFFERENCE
 
 
@@ -306,12 +340,21 @@ MIN_OWN_HARMONICS, MAX_OWN_HARMONICS = 4, 12
 """Smallest number of harmonics, and highest one, by which a tone is that of another machine; chosen."""
 
 
-def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, bin_width: float) -> bool:
-    """Return whether chatter has more harmonics than side bands, as tooth passing of another spindle has; in Hz."""
+MIN_SIDEBAND_ENERGY = 1e-2
+"""Energy of side bands over that of a tone and its harmonics, below which it is of another machine; chosen."""
+
+
+def has_own_comb(left: SpectralPeaks, chatter: ChatterPeaks, tooth_frequency: float, bin_width: float) -> bool:
+    """Return whether chatter has more harmonics than side bands, and these are faint, as another spindle has; in Hz.
+
+    Chatter that leaves the cut has harmonics with side bands one tooth passing away.
+    """
     order = np.round(left.frequency / chatter.frequency)
     reach = spectral.PEAK_TOLERANCE * bin_width * np.maximum(order / 2, 1)
-    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 1) & (order <= MAX_OWN_HARMONICS)
-    return bool(np.count_nonzero(is_own) >= max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1))
+    is_own = (np.abs(left.frequency - order * chatter.frequency) < reach) & (order > 0) & (order <= MAX_OWN_HARMONICS)
+    is_sideband = (_find_explained(left, chatter.frequency, tooth_frequency, bin_width) > 0) & ~is_own
+    is_comb = np.count_nonzero(is_own) > max(MIN_OWN_HARMONICS, len(chatter.peaks) + 1)
+    return bool(is_comb and left[is_sideband].energy < MIN_SIDEBAND_ENERGY * left[is_own].energy)
 
 
 MIN_CHATTER_SHARE, MIN_WEAK_CHATTER_SHARE = 0.5, 0.85
@@ -322,22 +365,20 @@ MIN_SIDEBANDS = 3
 """Number of peaks of a sideband family that proves chatter."""
 
 
-def is_other_source(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float, is_faint: bool) -> bool:
-    """Return whether most unexplained peaks are no chatter, of which weak evidence needs a larger share; in Hz."""
-    is_weak = is_faint or len(chatter.peaks) < MIN_SIDEBANDS or has_own_comb(left, chatter, bin_width)
-    share = share_of_chatter(left, chatter, turn, bin_width)
-    return share < (MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE)
+def is_other_source(
+    left: SpectralPeaks, chatter: ChatterPeaks, turn: float, teeth: int, bin_width: float, is_faint: bool
+) -> bool:
+    """Return whether most unexplained peaks are no chatter, of which weak evidence needs a larger share; in Hz.
 
-
-def share_of_chatter(left: SpectralPeaks, chatter: ChatterPeaks, turn: float, bin_width: float) -> float:
-    """Return the energy of chatter, with the ripple of its lines, over that of all peaks; in Hz.
-
-    Harmonics of the chatter frequency count unless they are the comb of another spindle.
+    The ripple of its lines counts as chatter, its harmonics too unless they are the comb of another spindle.
     """
     is_chatter = np.any(np.abs(left.frequency[:, np.newaxis] - chatter.peaks.frequency) < RIPPLE_DISTANCE, axis=1)
-    if not has_own_comb(left, chatter, bin_width):
+    is_comb = has_own_comb(left, chatter, teeth * turn, bin_width)
+    if not is_comb:
         is_chatter |= _find_explained(left, chatter.frequency, turn, bin_width) > 0
-    return left[is_chatter].energy / left.energy
+    is_weak = is_faint or len(chatter.peaks) < MIN_SIDEBANDS or is_comb
+    least = MIN_WEAK_CHATTER_SHARE if is_weak else MIN_CHATTER_SHARE
+    return left[is_chatter].energy < least * left.energy
 
 
 def _find_explained(left: SpectralPeaks, frequency: float, tooth_frequency: float, bin_width: float) -> Floats:

@@ -84,9 +84,14 @@ def _count_same(speed: SpindleSpeed, others: Sequence[SpindleSpeed]) -> int:
 
 
 def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
-    """Find the speed of all axes together; where the peaks fit none, once more without the side bands of ripple."""
-    found = (_find_speed(spectra, air, teeth, commanded, distance) for distance in (0.0, RIPPLE_DISTANCE))
-    return next((speed for speed in found if speed is not None), None)
+    """Find the speed of all axes together; if it fits badly, once more without side bands of ripple."""
+    speed = _find_speed(spectra, air, teeth, commanded, 0.0)
+    if speed is not None and speed.misfit < MAX_SPEED_MISFIT:
+        return speed
+    plain = _find_speed(spectra, air, teeth, commanded, RIPPLE_DISTANCE)
+    if speed is None or plain is None or _count_same(plain, [speed]):
+        return speed or plain
+    return min(speed, plain, key=lambda each: each.misfit)
 
 
 def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> SpindleSpeed | None:

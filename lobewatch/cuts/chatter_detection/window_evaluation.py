@@ -10,7 +10,7 @@ from lobewatch.cuts.chatter_detection import cut_windows as windowing
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.cut_detection import CutParts
 from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, KnownCut
-from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, rank_evidence
+from lobewatch.cuts.chatter_detection.evaluated_cut import CutEvaluation, is_beyond_ripple, rank_evidence
 
 Evaluate = Callable[[slice, KnownCut], CutEvaluation]
 """Function that evaluates the samples of a window."""
@@ -20,6 +20,8 @@ MIN_STABLE_SHARE = 0.5
 """Share of stable windows of a cut without chatter above which it is stable, although others tell nothing; chosen."""
 MIN_SHORT_ENERGY = 0.3
 """Least energy of chatter over that of the comb in a short window, which does not resolve ripple; chosen."""
+MIN_RESOLVED_ENERGY = 0.03
+"""The same where ripple puts nothing, even in a short window; chosen."""
 MIN_STRIKING_LOUDNESS = 3.0
 """Loudness of a short window over that of the stable ones, above which it counts unless it is stable; chosen."""
 MIN_GROWTH = 3.0
@@ -81,7 +83,8 @@ def _is_clear_chatter(sound: CutEvaluation, usual: float) -> bool:
     if sound.chatter is None or sound.peaks is None or not len(sound.peaks.comb):
         return False
     own = sound.peaks.comb.energy
-    return sound.energy_ratio * own > MIN_SHORT_ENERGY * max(own, usual)
+    least = MIN_RESOLVED_ENERGY if is_beyond_ripple(sound) else MIN_SHORT_ENERGY
+    return sound.energy_ratio * own > least * max(own, usual)
 
 
 def _loudness(axes: Floats, sound: CutEvaluation) -> float:

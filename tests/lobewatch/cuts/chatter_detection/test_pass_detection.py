@@ -99,3 +99,9 @@ def test_a_cut_that_is_overloaded_again_and_again_is_kept_whole() -> None:
     clipped = np.arange(30_000) % 2000 == 0
     parts = CutParts("", slice(0, 4000), slice(5000, 25_000))
     assert trim_overload(parts, clipped, RATE) == parts
+
+
+def test_a_speed_far_from_the_set_one_is_named_in_a_shop_as_notes_of_music_fit_one(shop: Floats) -> None:
+    heard = evaluate_recording(CutRecording(cutting(shop), RATE, TEETH, 0.3, 60 * TURN / 1.03))
+    assert {sound.reason for sound in heard} == {"speed-not-found"}
+    assert [sound.distant_rpm for sound in heard] == pytest.approx([60 * TURN] * 3, rel=5e-4)

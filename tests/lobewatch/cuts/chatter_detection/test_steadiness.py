@@ -75,3 +75,9 @@ def test_three_multiples_must_have_changed_alike_and_the_first_is_that_of_air(
     wavering = wavers(step(1e-3, 1), {}, dict.fromkeys(orders, 10.0))
     assert (wavering > 5 * LEAST) is is_heard
     assert (wavering == LEAST) is not is_heard
+
+
+def test_chatter_as_far_from_some_multiples_all_along_is_no_change_of_speed() -> None:
+    """Six of eight lines, 7e-4 above their multiples in all quarters, while the others are exact."""
+    near = {TURN * order * 1.0007: 30.0 for order in (23, 24, 27, 28, 29, 31)}
+    assert wavers(np.zeros_like, near, {4: 50.0, 5: 50.0}) == LEAST

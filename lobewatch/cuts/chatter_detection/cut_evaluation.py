@@ -132,7 +132,8 @@ def _compare_with_ripple(sound: CutEvaluation, axis: CutAxis) -> CutEvaluation:
     """Compare chatter with ripple in a stable cut: its side bands, and modes that ring after each rib."""
     if sound.chatter is None or sound.peaks is None or is_beyond_ripple(sound):
         return sound
-    evenness = load_ripple.compute_evenness(axis.signal, axis.spectrum, sound.peaks.air.frequency, axis.turn)
+    about = axis.spectrum, sound.peaks.air.frequency, axis.turn, axis.known.lowest
+    evenness = load_ripple.compute_evenness(axis.signal, *about)
     is_even = evenness > MIN_STEADY_EVENNESS and not (axis.ripple and axis.ripple.speed)
     if evenness > MAX_PULSE_EVENNESS and (is_even or sound.energy_ratio > MIN_UNEVEN_ENERGY):
         return sound

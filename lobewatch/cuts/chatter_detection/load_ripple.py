@@ -216,6 +216,8 @@ MIN_KNOWN_SIDEBANDS = 4
 """Smallest number of places next to other multiples where a common side band would be clear of the noise; chosen."""
 NOISE_MARGIN = 2.0
 """Expected amplitude of a side band over the noise, below which its absence shows nothing; chosen."""
+MAX_HARMONIC_RATIO = 3.0
+"""Largest amplitude of a harmonic of a ripple over its first one divided by the order: pulses of a tenth have 3."""
 OWN_SIDEBAND_BINS = 4.0
 """Distance from a multiple within which there is no side band of another one (bins), half the main lobe."""
 
@@ -227,11 +229,13 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     `MAX_LOAD_DISTANCE` from a multiple that is louder, or that has a like peak on its other side, is a slow change of
     the load. Result of shape (n,).
     """
+    comb = _join_first_order(comb, spectrum, turn)
     beyond = left.frequency[:, np.newaxis] - comb.frequency
     ratio = left.amplitude[:, np.newaxis] / comb.amplitude
     peak, own = np.nonzero((np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (ratio < MAX_SIDEBAND_AMPLITUDE))
     least, distance = ratio[peak, own] / MAX_SIDEBAND_RATIO, beyond[peak, own]
     usual = _usual_sidebands(comb, own, distance, least, spectrum, turn)
+    usual[~_is_below_nearer(usual, distance, comb, spectrum, turn)] = 0.0
     mirrored = np.sqrt(spectrum.max_power_near(comb.frequency[own] - distance, spectral.PEAK_TOLERANCE))
     is_near = np.abs(distance) < MAX_RIPPLE_FREQUENCY
     is_pair = np.isnan(usual) & is_near & (mirrored > MIN_PAIR_RATIO * left.amplitude[peak])
@@ -241,6 +245,14 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     is_load = np.abs(left.frequency - nearest) < MAX_LOAD_DISTANCE
     is_load &= np.max(louder, axis=0) > left.amplitude
     return np.asarray((np.bincount(peak, is_pair | (usual > least), len(left)) > 0) | is_load)
+
+
+def _join_first_order(comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> SpectralPeaks:
+    """Join a comb and the spindle frequency (Hz), which is in air, too, but ripples like its multiples in a cut."""
+    first = np.array([turn])
+    power = spectrum.max_power_near(first, spectral.PEAK_TOLERANCE)
+    noise = np.interp(first, spectrum.frequency, spectrum.noise)
+    return spectral.join_peaks([comb, SpectralPeaks(first, np.sqrt(power), power / noise)])
 
 
 def _usual_sidebands(
@@ -262,6 +274,22 @@ def _usual_sidebands(
     return np.where(is_enough, np.nanmedian(np.where(is_enough, known, 0.0), axis=0), np.nan)
 
 
+def _is_below_nearer(
+    usual: Floats, distance: Floats, comb: SpectralPeaks, spectrum: Spectrum, turn: float
+) -> Flags:
+    """Return whether side bands beyond `MAX_RIPPLE_FREQUENCY` have one of the same ripple below it.
+
+    usual: median relative amplitude of side bands at distances (Hz). Harmonics of a load that steps fall as 1 / order.
+    """
+    near = np.arange(MAX_LOAD_DISTANCE, MAX_RIPPLE_FREQUENCY, spectrum.bin_width / 2)
+    nobody = np.full(near.size, len(comb))
+    first = _usual_sidebands(comb, nobody, near, np.full(near.size, np.inf), spectrum, turn)
+    order = np.arange(2, int(MAX_SIDEBAND_DISTANCE / MAX_LOAD_DISTANCE) + 1)[:, np.newaxis]
+    least = np.interp(np.abs(distance) / order, near, np.nan_to_num(first), left=0.0, right=0.0) / order
+    allowed = MAX_HARMONIC_RATIO * np.max(least, axis=0)
+    return np.asarray((np.abs(distance) < MAX_RIPPLE_FREQUENCY) | np.isnan(usual) | (usual < allowed))
+
+
 def widen_air(air: Spectrum) -> Spectrum:
     """Return the spectrum of air whose lines are as wide as sampling at equal angles makes them."""
     wide = 2 * round(MAX_RIPPLE_FREQUENCY / air.frequency[1]) + 1
@@ -280,18 +308,19 @@ SILENT_POWER = 1e-9
 """Power over the largest below which it counts as zero; chosen."""
 
 
-def compute_evenness(signal: Floats, spectrum: Spectrum, air: Floats, turn: float) -> float:
+def compute_evenness(signal: Floats, spectrum: Spectrum, air: Floats, turn: float, lowest: float) -> float:
     """Return how even the power of a signal without its spindle harmonics is, from 0 (pulses) to 1 (constant).
 
     Squared mean over mean square of its loudest piece. Modes ring in pulses after each rib, chatter lasts or grows.
-    air: frequencies of tones in the air (Hz); turn: of the spindle (Hz). The power is the mean of a turn.
+    air: frequencies of tones in the air (Hz); turn: of the spindle (Hz); lowest: of chatter (Hz), as ripple itself is
+    slower and lasts. The power is the mean of a turn.
     """
     rate, size = spectrum.sample_rate, signal.size
     taper = scipy.signal.windows.hann(size, sym=False)
     transform = scipy.fft.rfft((signal - np.mean(signal)) * taper)
     every = np.arange(transform.size) * (rate / size)
     gap = max(UNEVEN_MARGIN, OWN_SIDEBAND_BINS * rate / size)
-    is_other = spectral.fold_frequency(every, turn) > gap
+    is_other = (spectral.fold_frequency(every, turn) > gap) & (every > lowest)
     is_other &= np.interp(every, spectrum.frequency, spectrum.power / spectrum.noise) > spectral.MIN_PEAK_POWER
     for tone in air:
         is_other &= np.abs(every - tone) > gap

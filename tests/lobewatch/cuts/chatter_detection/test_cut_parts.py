@@ -171,6 +171,31 @@ def test_side_bands_of_one_multiple_are_no_ripple() -> None:
     assert not found[2]
 
 
+def find_ripple_beside(multiples: Floats, bands: dict[float, float]) -> list[bool]:
+    """Find ripple among side bands; bands: their distances (Hz) and relative amplitudes, the same next to each."""
+    time, amplitude = np.arange(12_800) / RATE, 1 / np.arange(1, multiples.size + 1)
+    beside = (multiples[:, np.newaxis] + list(bands)).ravel()
+    loud = (amplitude[:, np.newaxis] * list(bands.values())).ravel()
+    lines = zip(np.append(multiples, beside), np.append(amplitude, loud), strict=True)
+    signal = sum(a * np.cos(2 * np.pi * f * time) for f, a in lines)
+    signal = np.asarray(signal) + 1e-4 * np.random.default_rng(0).normal(size=time.size)
+    left = SpectralPeaks(beside, loud, np.full(beside.size, 1e6))
+    comb = multiples > 100.0
+    known = SpectralPeaks(multiples[comb], amplitude[comb], np.full(np.count_nonzero(comb), 1e6))
+    return [bool(found) for found in find_ripple_peaks(left, known, compute_spectrum(signal, RATE), 100.0)]
+
+
+def test_chatter_40_hz_from_all_multiples_is_no_ripple_unless_it_is_a_harmonic_of_one() -> None:
+    """Ripple is slower than 30 Hz, so that its harmonics have a louder first one."""
+    multiples: Floats = 400.0 * np.arange(1, 5)
+    assert not any(find_ripple_beside(multiples, {-40.0: 0.1, 40.0: 0.1}))
+    assert all(find_ripple_beside(multiples, {-40.0: 0.03, -8.0: 0.15, 8.0: 0.15, 40.0: 0.03}))
+
+
+def test_the_first_multiple_of_the_spindle_ripples_like_the_others() -> None:
+    assert all(find_ripple_beside(100.0 * np.array([1.0, 4.0, 8.0, 12.0]), {-12.0: 0.1, 12.0: 0.1}))
+
+
 @pytest.mark.parametrize(("lines", "is_load"), [((-1.5, 1.5), True), ((1.5,), False), ((-9.0, 9.0), False)])
 def test_a_pair_next_to_a_multiple_that_a_corner_cancels_is_the_load(lines: tuple[float, ...], is_load: bool) -> None:
     time, multiple = np.arange(4 * 6400) / RATE, 1800.0
@@ -274,11 +299,11 @@ def test_air_of_another_microphone_position_gets_the_noise_of_the_recording(
 
 
 def evenness(envelope: NDArray[np.floating[Any]]) -> float:
-    """Evenness of a line with an envelope, shape (n,), in a comb that is far louder."""
+    """Evenness of a line with an envelope, shape (n,), in a comb and a slow ripple that are far louder."""
     time = np.arange(envelope.size) / RATE
     line = envelope * np.cos(2 * np.pi * 1760 * time) + 50.0 * np.cos(2 * np.pi * 9 * TURN * time)
-    signal = line + 1e-3 * np.random.default_rng(0).normal(size=time.size)
-    return compute_evenness(signal, compute_spectrum(signal, RATE), np.zeros(0), TURN)
+    signal = line + 20.0 * np.cos(2 * np.pi * 50.5 * time) + 1e-3 * np.random.default_rng(0).normal(size=time.size)
+    return compute_evenness(signal, compute_spectrum(signal, RATE), np.zeros(0), TURN, 100.0)
 
 
 def test_evenness_is_the_share_of_time_that_a_line_sounds_in() -> None:

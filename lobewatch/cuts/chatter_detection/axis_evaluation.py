@@ -134,11 +134,16 @@ def _evaluate_unexplained(axis: CutAxis, sound: CutEvaluation, peaks: PeaksByOri
 
 
 def _choose_family(axis: CutAxis, left: SpectralPeaks, named: ChatterPeaks, is_faint: bool) -> tuple[ChatterPeaks, str]:
-    """Choose the named family of peaks, or else the loudest, with the reason why it is no chatter; empty if it is."""
+    """Choose the named family of peaks, or else the loudest, with the reason why it is no chatter; empty if it is.
+
+    The loudest family needs three loud peaks, or nearly all energy, as where a cut chatters at two frequencies.
+    """
     turn, bin_width = axis.turn, axis.spectrum.bin_width
     reasons = []
     loudest = classification.find_loudest_family(left, axis.tooth, bin_width)
-    for family in (named, loudest) if len(loudest.peaks) >= classification.MIN_SIDEBANDS else (named,):
+    is_clear = len(loudest.peaks) >= classification.MIN_SIDEBANDS
+    is_clear |= loudest.peaks.energy > classification.MIN_WEAK_CHATTER_SHARE * left.energy
+    for family in (named, loudest) if is_clear else (named,):
         if not classification.has_sidebands(left, family, turn, bin_width):
             reasons.append("unexplained-tone")
         elif classification.is_other_source(left, family, turn, axis.teeth, bin_width, is_faint):

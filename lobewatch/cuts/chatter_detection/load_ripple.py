@@ -235,7 +235,6 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     peak, own = np.nonzero((np.abs(beyond) < MAX_SIDEBAND_DISTANCE) & (ratio < MAX_SIDEBAND_AMPLITUDE))
     least, distance = ratio[peak, own] / MAX_SIDEBAND_RATIO, beyond[peak, own]
     usual = _usual_sidebands(comb, own, distance, least, spectrum, turn)
-    usual[~_is_below_nearer(usual, distance, comb, spectrum, turn)] = 0.0
     mirrored = np.sqrt(spectrum.max_power_near(comb.frequency[own] - distance, spectral.PEAK_TOLERANCE))
     is_near = np.abs(distance) < MAX_RIPPLE_FREQUENCY
     is_pair = np.isnan(usual) & is_near & (mirrored > MIN_PAIR_RATIO * left.amplitude[peak])
@@ -244,7 +243,8 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     louder = np.sqrt(spectrum.max_power_near(around, spectral.PEAK_TOLERANCE)) / [[1.0], [MIN_PAIR_RATIO]]
     is_load = np.abs(left.frequency - nearest) < MAX_LOAD_DISTANCE
     is_load &= np.max(louder, axis=0) > left.amplitude
-    return np.asarray((np.bincount(peak, is_pair | (usual > least), len(left)) > 0) | is_load)
+    is_usual = (usual > least) & _has_nearer(usual, distance, comb, spectrum, turn)
+    return np.asarray((np.bincount(peak, is_pair | is_usual, len(left)) > 0) | is_load)
 
 
 def _join_first_order(comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> SpectralPeaks:
@@ -274,20 +274,19 @@ def _usual_sidebands(
     return np.where(is_enough, np.nanmedian(np.where(is_enough, known, 0.0), axis=0), np.nan)
 
 
-def _is_below_nearer(
-    usual: Floats, distance: Floats, comb: SpectralPeaks, spectrum: Spectrum, turn: float
-) -> Flags:
-    """Return whether side bands beyond `MAX_RIPPLE_FREQUENCY` have one of the same ripple below it.
+def _has_nearer(usual: Floats, distance: Floats, comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> Flags:
+    """Return whether side bands beyond `MAX_RIPPLE_FREQUENCY` have a nearer one, of which they may be a harmonic.
 
     usual: median relative amplitude of side bands at distances (Hz). Harmonics of a load that steps fall as 1 / order.
     """
-    near = np.arange(MAX_LOAD_DISTANCE, MAX_RIPPLE_FREQUENCY, spectrum.bin_width / 2)
-    nobody = np.full(near.size, len(comb))
-    first = _usual_sidebands(comb, nobody, near, np.full(near.size, np.inf), spectrum, turn)
-    order = np.arange(2, int(MAX_SIDEBAND_DISTANCE / MAX_LOAD_DISTANCE) + 1)[:, np.newaxis]
-    least = np.interp(np.abs(distance) / order, near, np.nan_to_num(first), left=0.0, right=0.0) / order
-    allowed = MAX_HARMONIC_RATIO * np.max(least, axis=0)
-    return np.asarray((np.abs(distance) < MAX_RIPPLE_FREQUENCY) | np.isnan(usual) | (usual < allowed))
+    step = spectrum.bin_width
+    lowest = min(OWN_SIDEBAND_BINS * step, MAX_RIPPLE_FREQUENCY)
+    near = np.arange(lowest, MAX_RIPPLE_FREQUENCY + step, step / 2)
+    no_own, any_noise = np.full(near.size, len(comb)), np.full(near.size, np.inf)
+    first = np.nan_to_num(_usual_sidebands(comb, no_own, near, any_noise, spectrum, turn))
+    order = np.arange(2, int(MAX_SIDEBAND_DISTANCE / lowest) + 1)[:, np.newaxis]
+    largest = MAX_HARMONIC_RATIO * np.interp(np.abs(distance) / order, near, first, left=0.0, right=0.0) / order
+    return np.asarray((np.abs(distance) < MAX_RIPPLE_FREQUENCY) | (usual < np.max(largest, axis=0)))
 
 
 def widen_air(air: Spectrum) -> Spectrum:

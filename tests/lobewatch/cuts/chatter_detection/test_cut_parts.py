@@ -207,6 +207,19 @@ def test_a_pair_next_to_a_multiple_that_a_corner_cancels_is_the_load(lines: tupl
     assert list(found) == [is_load] * len(lines)
 
 
+def test_the_loudest_of_two_chatter_frequencies_is_told() -> None:
+    """The lower one has more side bands, but next to none of the energy."""
+
+    def two(t: Floats) -> Floats:
+        lines = [(1760.0, 9.0), (1760.0 + TURN, 0.3), *((1100.0 + k * TEETH * TURN, 0.4) for k in (-1, 1, 2, 3))]
+        return np.asarray(sum(a * np.cos(2 * np.pi * f * t) for f, a in [*lines, (1100.0, 2.0)]))
+
+    heard = listen(recording(2.2, add=two))
+    assert heard.verdict == "chatter"
+    assert heard.chatter is not None
+    assert heard.chatter.frequency == pytest.approx(1760.0, abs=0.5)
+
+
 @pytest.mark.parametrize("amplitude", [0.4, 1.0])
 def test_a_cut_that_chatters_loudly_at_its_entry_is_not_stable(amplitude: float) -> None:
     growing = chatter(0.0, 0.4)

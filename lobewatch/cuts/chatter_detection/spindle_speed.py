@@ -49,6 +49,8 @@ MIN_GRID_SHARE = 0.5
 """Smallest share of peaks on the harmonic grid, and of peaks with a neighbor one or two turns or teeth away."""
 RIPPLE_DISTANCE = 30.0
 """Distance between peaks by which a speed is searched again (Hz), as side bands of ripple are nearer."""
+MIN_CLEAR_PEAKS, MIN_EXPLAINED_SHARE = 20, 0.15
+"""Number of clear peaks from which a speed must explain some, and smallest share of them, as music has many; chosen."""
 MIN_AGREEING_PEAKS = 3
 """Smallest number of matching peaks, as a pump has a comb, too."""
 
@@ -109,8 +111,16 @@ def _find_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float, di
     voted = _find_speed_by_peaks(spectra, air, teeth, commanded, distance)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
-        return voted or summed
-    return summed if refine_speed(summed.frequency, peaks, spectra[0].bin_width).agreeing >= voted.agreeing else voted
+        found = voted or summed
+    else:
+        is_sum = refine_speed(summed.frequency, peaks, spectra[0].bin_width).agreeing >= voted.agreeing
+        found = summed if is_sum else voted
+    return found if found is not None and _explains(found, peaks, spectra[0].bin_width) else None
+
+
+def _explains(speed: SpindleSpeed, peaks: SpectralPeaks, bin_width: float) -> bool:
+    """Return whether a speed explains enough of the clear peaks of a cut, where they are many."""
+    return len(peaks) < MIN_CLEAR_PEAKS or refine_speed(speed.frequency, peaks, bin_width).share >= MIN_EXPLAINED_SHARE
 
 
 def _find_speed_by_peaks(

@@ -6,6 +6,7 @@ All that is chosen here is plausible, not measured, but for cuts that chatter.
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -228,15 +229,22 @@ class CutPrediction(NamedTuple):
         return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
 
 
-def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
-    """Predict the result of a cut for all samples in its worst feed direction; NaN without a verdict."""
+def predict_cut(cut: CutEvidence, samples: SpindleSamples, *, is_estimated: bool = True) -> CutPrediction:
+    """Predict the result of a cut for all samples in its worst feed direction; NaN without a verdict.
+
+    is_estimated: False for zero-order limits by search where flanks damp. Estimates are close to most of them.
+    """
     if not cut.has_verdict:
         unknown = np.full(len(samples), np.nan)
         return CutPrediction(unknown, unknown, unknown, np.zeros(len(samples), dtype=np.bool_))
     rows = samples.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
     speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * samples.at_rest.speed_rpm
     rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
-    predict = _predict_by_zero_order if is_force_constant(cut.cut) else _predict_by_multipliers
+    predict = (
+        partial(_predict_by_zero_order, is_estimated=is_estimated)
+        if is_force_constant(cut.cut)
+        else _predict_by_multipliers
+    )
     fed = [predict(rows.with_feed_angle(angle), cut) for angle in cut.feed_angles]
     worst = np.argmax([prediction.excess for prediction in fed], axis=0)[np.newaxis]
     return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True)))
@@ -334,10 +342,10 @@ def _folded_chatter(cut: CutEvidence) -> Floats:
     return fold_frequency(cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2, cut.tooth_frequency)
 
 
-def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence, *, is_estimated: bool) -> CutPrediction:
     """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
-    limit, at_limit = _limits_near(mean, cut.depth)
+    limit, at_limit = _limits_near(mean, cut.depth, is_estimated=is_estimated)
     excess = np.clip(np.log(np.maximum(cut.depth / limit, 1e-9)), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
@@ -348,10 +356,11 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
 
 
-def _limits_near(batch: ZeroOrderBatch, depth: float) -> tuple[Floats, Floats]:
+def _limits_near(batch: ZeroOrderBatch, depth: float, *, is_estimated: bool = True) -> tuple[Floats, Floats]:
     """Return limits (m) and chatter frequencies (Hz), with process damping only up to twice a depth (m)."""
     deepest = CLEARLY_STABLE_RATIO * depth if np.any(batch.rows.process_damping) else np.inf
-    limit, chatter = batch.estimate_limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
+    find_limits = batch.estimate_limits if is_estimated else batch.limits
+    limit, chatter = find_limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
     return limit[:, 0], chatter[:, 0]
 
 

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from lobes import Cut, MillingRows, build_milling_system, count_pieces, rows_at_speeds
+from lobes import Cut, MillingRows, build_milling_system, count_pieces, growth_rate, rows_at_speeds
 from lobes.floquet import largest_multipliers
+from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.stability_boundary import loudest_chatter_frequency
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
@@ -204,7 +205,7 @@ class CutPrediction(NamedTuple):
     excess: Floats
     """Logarithm of depth over limit; positive if it chatters."""
     frequency: Floats
-    """Frequency of the largest multiplier (Hz), folded to 0 to half the tooth frequency; NaN if unknown."""
+    """Frequency of the largest multiplier (Hz), folded to 0 to half the tooth frequency; may be NaN without evidence."""
     limit_frequency: Floats
     """Folded frequency at the limit of its speed by the zero-order approximation (Hz); may be NaN without evidence."""
     is_flip: Flags
@@ -346,7 +347,7 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence, *, is_estimated:
     """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
     limit, at_limit = _limits_near(mean, cut.depth, is_estimated=is_estimated)
-    excess = np.clip(np.log(np.maximum(cut.depth / limit, 1e-9)), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    excess = _limit_excess(np.log(np.maximum(cut.depth / limit, 1e-9)))
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
@@ -369,16 +370,21 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
 
     Growth of the logarithm of the motion over the decay that the spindle has without a cut.
     """
-    depth = np.full((len(rows), 1), cut.depth)
-    multiplier = largest_multipliers(rows, depth, count_pieces(rows, cut.depth), MULTIPLIER_ACCURACY)[:, 0]
+    depth, unknown = np.full((len(rows), 1), cut.depth), np.full(len(rows), np.nan)
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
-    excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
-    angle = np.abs(np.angle(multiplier))
-    teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
-    if cut.has_frequency:
-        _, at_limit = _limits_near(ZeroOrderBatch.of(rows), cut.depth)
+    if not cut.has_frequency:
+        growth = growth_rate(rows, depth, count_pieces(rows, cut.depth, COARSE_CYCLES_PER_PIECE))[:, 0]
+        return CutPrediction(_limit_excess(growth / quiet), unknown, unknown, np.zeros(len(rows), dtype=np.bool_))
+    multiplier = largest_multipliers(rows, depth, count_pieces(rows, cut.depth), MULTIPLIER_ACCURACY)[:, 0]
+    excess = _limit_excess(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet)
+    angle, teeth = np.abs(np.angle(multiplier)), 1 / rows.tooth_period
+    _, at_limit = _limits_near(ZeroOrderBatch.of(rows), cut.depth)
     is_flip = np.pi - angle < FLIP_ANGLE_TOLERANCE
     return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), is_flip)
+
+
+def _limit_excess(excess: Floats) -> Floats:
+    return np.clip(excess, -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
 
 
 class ExpectedChatter(NamedTuple):

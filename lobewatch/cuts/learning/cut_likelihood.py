@@ -205,7 +205,7 @@ class CutPrediction(NamedTuple):
     excess: Floats
     """Logarithm of depth over limit; positive if it chatters."""
     frequency: Floats
-    """Frequency of the largest multiplier (Hz), folded to 0 to half the tooth frequency; may be NaN without evidence."""
+    """Folded frequency of the largest multiplier (Hz); may be NaN without evidence."""
     limit_frequency: Floats
     """Folded frequency at the limit of its speed by the zero-order approximation (Hz); may be NaN without evidence."""
     is_flip: Flags

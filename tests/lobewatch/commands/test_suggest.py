@@ -17,7 +17,8 @@ Shop = Any
 
 @pytest.fixture
 def run(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command on the machine of the shop: exit code, stdout, stderr."""
+    """Run a command on the machine of the shop, whose spindle has few speeds: exit code, stdout, stderr."""
+    shop.edit("low_rpm = 3000\nhigh_rpm = 24000", "low_rpm = 6000\nhigh_rpm = 14000")
 
     def call(name: str, *words: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", name, str(shop.path), *words])

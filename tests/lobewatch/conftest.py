@@ -20,6 +20,9 @@ from acquisition import (
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.folder_files import make_machine_folder
+from lobewatch.machine.folder_updates import ObservedWord, make_observed_cut, store_cut
+from lobewatch.machine.journal.entries import CutEntry
+from lobewatch.machine.settings.requested_cut import find_cut_setting
 from modal import Mode, synthesize_frf
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
@@ -107,6 +110,11 @@ class Shop:
         """Both directions; share: of the frequency of the new spindle."""
         self.tap(days, 1713.0 * share)
         self.tap(days + 0.1, 1690.0 * share, "y")
+
+    def hear(self, speed: float, depth_mm: float, word: ObservedWord, frequency: float | None = None) -> CutEntry:
+        """Store a test cut of program A one day after the start."""
+        setting = find_cut_setting(self.folder.machine, "A", speed, depth_mm)
+        return store_cut(self.folder, make_observed_cut(setting, word, frequency, at=START + timedelta(days=1)))
 
 
 @pytest.fixture(scope="session")

@@ -6,13 +6,15 @@ All that is chosen here is plausible, not measured, but for cuts that chatter.
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import scipy
 
-from lobes import Cut, MillingRows, build_milling_system, count_pieces, rows_at_speeds
+from lobes import Cut, MillingRows, build_milling_system, count_pieces, growth_rate, rows_at_speeds
 from lobes.floquet import largest_multipliers
+from lobes.floquet.milling_rows import COARSE_CYCLES_PER_PIECE
 from lobes.floquet.stability_boundary import loudest_chatter_frequency
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
@@ -203,7 +205,7 @@ class CutPrediction(NamedTuple):
     excess: Floats
     """Logarithm of depth over limit; positive if it chatters."""
     frequency: Floats
-    """Frequency of the largest multiplier (Hz), folded to 0 to half the tooth frequency; NaN if unknown."""
+    """Folded frequency of the largest multiplier (Hz); may be NaN without evidence."""
     limit_frequency: Floats
     """Folded frequency at the limit of its speed by the zero-order approximation (Hz); may be NaN without evidence."""
     is_flip: Flags
@@ -228,15 +230,22 @@ class CutPrediction(NamedTuple):
         return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.frequency, self.limit_frequency])))
 
 
-def predict_cut(cut: CutEvidence, samples: SpindleSamples) -> CutPrediction:
-    """Predict the result of a cut for all samples in its worst feed direction; NaN without a verdict."""
+def predict_cut(cut: CutEvidence, samples: SpindleSamples, *, is_estimated: bool = True) -> CutPrediction:
+    """Predict the result of a cut for all samples in its worst feed direction; NaN without a verdict.
+
+    is_estimated: False for zero-order limits by search where flanks damp. Estimates are close to most of them.
+    """
     if not cut.has_verdict:
         unknown = np.full(len(samples), np.nan)
         return CutPrediction(unknown, unknown, unknown, np.zeros(len(samples), dtype=np.bool_))
     rows = samples.build_rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
     speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * samples.at_rest.speed_rpm
     rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.frequency_ratio, speed_rpm=speed)
-    predict = _predict_by_zero_order if is_force_constant(cut.cut) else _predict_by_multipliers
+    predict = (
+        partial(_predict_by_zero_order, is_estimated=is_estimated)
+        if is_force_constant(cut.cut)
+        else _predict_by_multipliers
+    )
     fed = [predict(rows.with_feed_angle(angle), cut) for angle in cut.feed_angles]
     worst = np.argmax([prediction.excess for prediction in fed], axis=0)[np.newaxis]
     return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True)))
@@ -334,11 +343,11 @@ def _folded_chatter(cut: CutEvidence) -> Floats:
     return fold_frequency(cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2, cut.tooth_frequency)
 
 
-def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence, *, is_estimated: bool) -> CutPrediction:
     """Predict a cut whose force is constant by the zero-order approximation."""
     mean = ZeroOrderBatch.of(rows)
-    limit, at_limit = _limits_near(mean, cut.depth)
-    excess = np.clip(np.log(np.maximum(cut.depth / limit, 1e-9)), -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
+    limit, at_limit = _limits_near(mean, cut.depth, is_estimated=is_estimated)
+    excess = _limit_excess(np.log(np.maximum(cut.depth / limit, 1e-9)))
     frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
@@ -348,10 +357,11 @@ def _predict_by_zero_order(rows: MillingRows, cut: CutEvidence) -> CutPrediction
     return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
 
 
-def _limits_near(batch: ZeroOrderBatch, depth: float) -> tuple[Floats, Floats]:
+def _limits_near(batch: ZeroOrderBatch, depth: float, *, is_estimated: bool = True) -> tuple[Floats, Floats]:
     """Return limits (m) and chatter frequencies (Hz), with process damping only up to twice a depth (m)."""
     deepest = CLEARLY_STABLE_RATIO * depth if np.any(batch.rows.process_damping) else np.inf
-    limit, chatter = batch.estimate_limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
+    find_limits = batch.estimate_limits if is_estimated else batch.limits
+    limit, chatter = find_limits(batch.rows.speed_rpm[:, np.newaxis], deepest)
     return limit[:, 0], chatter[:, 0]
 
 
@@ -360,16 +370,21 @@ def _predict_by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPredictio
 
     Growth of the logarithm of the motion over the decay that the spindle has without a cut.
     """
-    depth = np.full((len(rows), 1), cut.depth)
-    multiplier = largest_multipliers(rows, depth, count_pieces(rows, cut.depth), MULTIPLIER_ACCURACY)[:, 0]
+    depth, unknown = np.full((len(rows), 1), cut.depth), np.full(len(rows), np.nan)
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
-    excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
-    angle = np.abs(np.angle(multiplier))
-    teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
-    if cut.has_frequency:
-        _, at_limit = _limits_near(ZeroOrderBatch.of(rows), cut.depth)
+    if not cut.has_frequency:
+        growth = growth_rate(rows, depth, count_pieces(rows, cut.depth, COARSE_CYCLES_PER_PIECE))[:, 0]
+        return CutPrediction(_limit_excess(growth / quiet), unknown, unknown, np.zeros(len(rows), dtype=np.bool_))
+    multiplier = largest_multipliers(rows, depth, count_pieces(rows, cut.depth), MULTIPLIER_ACCURACY)[:, 0]
+    excess = _limit_excess(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet)
+    angle, teeth = np.abs(np.angle(multiplier)), 1 / rows.tooth_period
+    _, at_limit = _limits_near(ZeroOrderBatch.of(rows), cut.depth)
     is_flip = np.pi - angle < FLIP_ANGLE_TOLERANCE
     return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), is_flip)
+
+
+def _limit_excess(excess: Floats) -> Floats:
+    return np.clip(excess, -MAX_LOG_EXCESS, MAX_LOG_EXCESS)
 
 
 class ExpectedChatter(NamedTuple):

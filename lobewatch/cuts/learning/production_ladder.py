@@ -1,5 +1,6 @@
 """Ladder of ordinary cuts: each removes more than the one before it, at a small chance of chatter."""
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -130,10 +131,7 @@ def _is_power_known(posterior: Posterior) -> bool:
 
 def _build_running_step(posterior: Posterior, grid: CutGrid, running: tuple[float, float] | None) -> LadderStep | None:
     """Return the running cut (rpm, m) as a step, whose power teaches Kt; None if it chatters too easily."""
-    if running is None:
-        return None
-    chance = float(np.mean(_predict(posterior.resample(N_LADDER_SAMPLES), grid, *running).chatter_probability))
-    return LadderStep(*running, chance) if chance <= MAX_CUT_RISK else None
+    return None if running is None else _verify_step(posterior.resample(N_LADDER_SAMPLES), grid, *running)
 
 
 def _find_step(
@@ -141,10 +139,11 @@ def _find_step(
 ) -> LadderStep | None:
     """Find the cut of the largest removal rate with little risk, or None if it gains nothing over a rate (rpm m)."""
     few = posterior.resample(N_LADDER_SAMPLES)
-    steps = [_verify_speed(few, grid, *place) for place in _list_speeds(posterior, grid)]
-    free = [step for step in steps if step and not is_setting_taken(step.speed_rpm, step.depth, cuts, rejected)]
-    best = max(free, key=lambda step: step.removal_rate, default=None)
-    return best if best is not None and best.removal_rate > (1 + MIN_STEP_GAIN) * rate else None
+    found = [(speed, _find_depth(few, grid, speed, depth)) for speed, depth in _list_speeds(posterior, grid)]
+    gaining = [place for place in found if math.prod(place) > (1 + MIN_STEP_GAIN) * rate]
+    free = [place for place in gaining if not is_setting_taken(*place, cuts, rejected)]
+    verified = (_verify_step(few, grid, *place) for place in sorted(free, key=math.prod, reverse=True))
+    return next((step for step in verified if step is not None), None)
 
 
 def _list_speeds(posterior: Posterior, grid: CutGrid) -> Iterator[tuple[float, float]]:
@@ -164,22 +163,28 @@ def _list_speeds(posterior: Posterior, grid: CutGrid) -> Iterator[tuple[float, f
             return
 
 
-def _verify_speed(few: Posterior, grid: CutGrid, speed: float, depth: float) -> LadderStep | None:
-    """Return the deepest cut with little risk at a speed (rpm), near a depth (m); None without one."""
+def _find_depth(few: Posterior, grid: CutGrid, speed: float, depth: float) -> float:
+    """Return the deepest cut (m) with little risk at a speed (rpm), near a depth (m); 0 without one."""
     deepest = float(np.interp(speed, grid.speeds, grid.max_depths))
     depth = max(floor_depth(depth), DEPTH_STEP_MM / 1e3)
     for _ in range(N_DEPTH_TRIES):
         within = min(deepest, CLEARLY_STABLE_RATIO * depth)
         depth = _deepest_with_little_risk(_predict(few, grid, speed, depth), depth, within)
         if depth <= 0:
-            return None
-    chance = float(np.mean(_predict(few, grid, speed, depth).chatter_probability))
+            return 0.0
+    return depth
+
+
+def _verify_step(few: Posterior, grid: CutGrid, speed: float, depth: float) -> LadderStep | None:
+    """Return a cut (rpm, m) as a step, None if it chatters too easily. No estimated limit decides."""
+    chance = float(np.mean(_predict(few, grid, speed, depth, is_estimated=False).chatter_probability))
     return LadderStep(speed, depth, chance) if chance <= MAX_CUT_RISK else None
 
 
-def _predict(few: Posterior, grid: CutGrid, speed: float, depth: float) -> CutPrediction:
+def _predict(few: Posterior, grid: CutGrid, speed: float, depth: float, *, is_estimated: bool = True) -> CutPrediction:
     """Predict a cut at its commanded speed, from which the true one may differ."""
-    return predict_cut(replace(grid.build_evidence(speed, depth), speed_found=False), few.samples)
+    cut = replace(grid.build_evidence(speed, depth), speed_found=False)
+    return predict_cut(cut, few.samples, is_estimated=is_estimated)
 
 
 def _deepest_with_little_risk(prediction: CutPrediction, depth: float, deepest: float) -> float:

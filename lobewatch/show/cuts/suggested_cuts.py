@@ -112,10 +112,10 @@ def question_lines(asked: CutEvidence, program: str, folder: Path) -> Iterator[s
     """Return the question whether a cut was stable, and how to answer it with and without a cut."""
     observe = observe_command(folder, program, asked.speed_rpm, 1e3 * asked.depth)
     place = f"{format_rpm(asked.speed_rpm)} rpm, {LENGTH.text(1e3 * asked.depth, '.4g')}"
-    yield f"Was {asked.id} stable at {place}? The other cuts speak against it."
+    yield f"Was {asked.id} stable at {place}? Other cuts put it in doubt."
     exclude = shlex.join(["lobewatch", "exclude", str(folder), asked.id, "--reason", "wrong verdict"])
     yield f"If it chattered: {exclude}"
-    yield f"Then: {observe} --chatter (and --frequency HZ if known)"
+    yield f"Then: {observe} --chatter (with --frequency HZ and --power KW if known)"
     yield f"If unsure, repeat the cut: {observe} --stable (or --chatter --frequency HZ)"
 
 

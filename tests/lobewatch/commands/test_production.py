@@ -91,7 +91,7 @@ def test_a_stable_word_against_three_deeper_ones_is_asked_by_its_name_and_correc
     assert (last["asks"], last["suggested"]["repeats"]) == ("c1", None)
     assert (later["asks"], later["suggested"]["repeats"]) == ("c1", "c1")
     lines = invoke(["suggest", str(mill.path), "--program", "A"]).stdout.splitlines()
-    assert lines[0] == "Was c1 stable at 12 900 rpm, 2 mm? The other cuts speak against it."
+    assert lines[0] == "Was c1 stable at 12 900 rpm, 2 mm? Other cuts put it in doubt."
     for line in lines[1:3]:
         invoke(shlex.split(line[line.index("lobewatch") : line.index(" (") if " (" in line else None])[1:])
     corrected = answer(mill, "suggest", "--program", "A")

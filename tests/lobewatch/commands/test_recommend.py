@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from lobewatch.cli import main
+from lobewatch.cuts.learning import production_ladder
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
@@ -17,7 +18,11 @@ SAVED = ("--save", "from the answer")
 
 @pytest.fixture
 def run(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run a command on the machine of the shop: exit code, stdout, stderr."""
+    """Run a command on the machine of the shop: exit code, stdout, stderr.
+
+    The ladder has tests of its own, so few samples are enough here.
+    """
+    monkeypatch.setattr(production_ladder, "N_LADDER_SAMPLES", 50)
 
     def call(name: str, *words: str) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["lobewatch", name, str(shop.path), *words])

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from lobewatch.arrays import Floats
 from lobewatch.cuts.learning import suggestion
 from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, find_questioned_cut, predict_cut
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.process_damping import ProcessDamping
 from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, N_LADDER_SAMPLES, Ladder, find_ladder
 from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
+from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
 
 
@@ -51,6 +54,17 @@ def test_the_chance_of_a_step_counts_the_error_of_the_speed(mill: Mill, ladder: 
     made = replace(mill.grid.build_evidence(first.speed_rpm, first.depth), speed_found=False)
     assert first.chatter_probability == pytest.approx(np.mean(predict_cut(made, few).chatter_probability))
     assert np.ptp(few.at_rest.speed_rpm) > 0
+
+
+def test_no_step_rests_on_estimated_limits(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:
+    estimate = ZeroOrderBatch.estimate_limits
+
+    def estimate_too_deep(*given: Any) -> tuple[Floats, Floats]:
+        limits, frequencies = estimate(*given)
+        return 1.3 * limits, frequencies
+
+    monkeypatch.setattr(ZeroOrderBatch, "estimate_limits", estimate_too_deep)
+    assert find_ladder(mill.prior, mill.grid, (), (), None, 1).steps == ()
 
 
 def test_ladder_and_search_expect_some_process_damping(mill: Mill, monkeypatch: pytest.MonkeyPatch) -> None:

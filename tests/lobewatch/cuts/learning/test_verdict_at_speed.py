@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from datetime import timedelta
 from typing import Any
 
 import numpy as np
@@ -12,18 +11,11 @@ from typer.testing import CliRunner
 
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.machine.folder_updates import exclude_entry, make_observed_cut, store_cut
-from lobewatch.machine.journal.entries import CutEntry
-from lobewatch.machine.settings.requested_cut import find_cut_setting
+from lobewatch.machine.folder_updates import exclude_entry
 from lobewatch.verdicts import Stability
 
 Shop = Any
 """Machine fixture of tests/lobewatch/conftest.py."""
-
-
-def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> CutEntry:
-    setting = find_cut_setting(shop.folder.machine, "A", speed, depth_mm)
-    return store_cut(shop.folder, make_observed_cut(setting, word, frequency, at=shop.start + timedelta(days=1)))
 
 
 def judged(shop: Shop, name: str = "A") -> Any:
@@ -32,14 +24,15 @@ def judged(shop: Shop, name: str = "A") -> Any:
 
 
 def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
     shop.tap_both()
     at_rest = judged(shop)
     assert at_rest.n_cuts == 0
-    hear(shop, 12900, 3.0, "stable")
+    shop.hear(12900, 3.0, "stable")
     first = judged(shop)
     for speed, depth in ((8700, 2.2), (12900, 3.4)):
-        hear(shop, speed, depth, "stable")
-    hear(shop, 8700, 3.0, "chatter", 1710.0)
+        shop.hear(speed, depth, "stable")
+    shop.hear(8700, 3.0, "chatter", 1710.0)
     four = judged(shop)
     assert (first.n_cuts, four.n_cuts) == (1, 4)
     assert (at_rest.samples.uncertainty.learned is None, four.samples.uncertainty.learned is None) == (True, False)
@@ -54,9 +47,11 @@ def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop
 
 
 def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
+    shop.edit("steps = 200", "steps = 50")
     shop.tap_both()
     assert "rotating" not in CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout
-    hear(shop, 12900, 3.0, "stable")
+    shop.hear(12900, 3.0, "stable")
     text = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout.split())
     assert re.search(r"learned from 1 test cut\b.*pockets.*not rotating", text)
     one_cut = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path), "--cut", "A"]).stdout.split())
@@ -64,11 +59,12 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
 
 
 def test_the_history_keeps_the_verdict_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5), ("B", 8700, 0.4))
     shop.edit("drop_percent = [0, 0]\n", "")
     shop.tap_both()
     before = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in before}
-    cut = hear(shop, 12900, 1.5, "chatter")
+    cut = shop.hear(12900, 1.5, "chatter")
     after = shop.logbook.verdicts()
     assert words(shop.logbook) == {verdict.program.name: verdict.stability for verdict in after}
     assert judged(shop).stability is not Stability.STABLE
@@ -86,10 +82,11 @@ def words(logbook: Logbook) -> dict[str, Stability]:
 
 
 def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_reported(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
     shop.tap_both()
     shop.tap(0.2, 1500.0, tool="long")
     for depth, word in ((3.0, "stable"), (3.1, "stable"), (0.3, "chatter")):
-        hear(shop, 12900, depth, word)
+        shop.hear(12900, depth, word)
     verdict = judged(shop)
     assert verdict.n_cuts == 2
     assert [remark.about for remark in verdict.remarks if remark.code == "cut-unexplained"] == ["c3"]
@@ -101,6 +98,6 @@ def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
     """Even where no spindle that explains them chatters at the program."""
     shop.run(("A", 12900, 0.5))
     shop.tap(0, 1713.0)
-    hear(shop, 12900, 1.0, "stable")
+    shop.hear(12900, 1.0, "stable")
     verdict = judged(shop)
     assert (verdict.stability, verdict.decisive_cause) == (Stability.DOUBTFUL, "untapped")

@@ -59,12 +59,13 @@ MASKS = (
     (re.compile(r"(by lobewatch )[0-9.]+\d"), r"\g<1>0"),
     (re.compile(r'("worst_feed_deg": ?)[0-9.]+'), r"\g<1>0"),
     (re.compile(r'("crc": ?")\w+'), r"\1"),
+    (re.compile(r'("residual_hz": ?)-?[0-9.]+e-(?:09|[1-9]\d)'), r"\g<1>0"),
     (re.compile(r"^\d+ of \d+ programs are checked.*\n|^.*: \d+ of \d+ tap tests\n", re.MULTILINE), ""),
     (re.compile(r"numpy \S+, scipy \S+ on \w+"), "numpy"),
     (re.compile(r'("kind": "mass-check", "id": "m1", "date": ")[^"]*(".*?"time": ")[^"]*'), r"\1\2"),
 )
-"""File marks of this disk with their checksum, versions, progress lines, a feed direction that rounding decides, and
-the time at which an emulator starts in another process."""
+"""File marks of this disk with their checksum, versions, progress lines, a feed direction and a residual that rounding
+decides, and the time at which an emulator starts in another process."""
 DIGESTS = re.compile(r'(^sha256 |"(?:sha256|previous|crc)": ?"?)[0-9a-f]+', re.MULTILINE)
 """Checksums, which follow from numbers that may differ on another processor."""
 

@@ -61,7 +61,7 @@ class ForeignTruth:
     reads_power: bool = False
     """True if the power of each cut is read."""
     answers: bool = False
-    """True if somebody who is asked about a stable cut looks it up and answers rightly, without a cut."""
+    """True if somebody looks a questioned stable cut up and answers rightly, without a cut."""
     cuts: list[CutEvidence] = field(default_factory=list)
     """Test cuts as they were written down."""
     truly_stable: list[bool] = field(default_factory=list)
@@ -106,7 +106,7 @@ class ForeignTruth:
         return ((f, zeta, k), (f * draw.uniform(1.35, 2.2), zeta, k * draw.uniform(1.5, 4)))[:count]
 
     def answer(self) -> None:
-        """Correct the cut that is asked about if it chattered, without its frequency."""
+        """Correct the questioned cut if it chattered, without its frequency."""
         asked = find_cut_to_ask(self.learnt, self.cuts)
         if asked is None or self.truly_stable[place := self.cuts.index(asked)]:
             return

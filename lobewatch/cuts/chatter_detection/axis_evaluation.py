@@ -25,7 +25,9 @@ MAX_STABLE_ENERGY = 2e-4
 MIN_CHATTER_OVER_RIPPLE = 1.5
 """Energy of unexplained peaks over that of ripple, below which they are its transients, as after each rib; chosen."""
 MIN_BEYOND_RIPPLE = 0.5
-"""The same for peaks where a stable cut with ripple has few: sharp edges reach them with up to a seventh; chosen."""
+"""Energy of peaks where ripple has few over that of ripple, from which there is chatter; chosen.
+
+Sharp edges reach them with up to a seventh."""
 MIN_COMB_ENERGY = 1e-9
 """Smallest energy assumed for the comb, over that of unexplained peaks."""
 FLIP_TOLERANCE = 0.003

@@ -21,7 +21,7 @@ MIN_STABLE_SHARE = 0.5
 MIN_SHORT_ENERGY = 0.3
 """Least energy of chatter over that of the comb in a short window, which does not resolve ripple; chosen."""
 MIN_RESOLVED_ENERGY = 0.03
-"""The same where ripple puts nothing, even in a short window; chosen."""
+"""Smallest energy of lines where ripple puts none over that of the comb, also in a short window; chosen."""
 MIN_STRIKING_LOUDNESS = 3.0
 """Loudness of a short window over that of the stable ones, above which it counts unless it is stable; chosen."""
 MIN_GROWTH = 3.0

@@ -76,7 +76,7 @@ class NextCut(NamedTuple):
     cut_range: CutRange
     """Speeds and depths that machine and tool allow."""
     asked: CutEvidence | None = None
-    """Stable cut whose verdict is asked about by name, or None."""
+    """Stable cut that is questioned by name, or None."""
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:

@@ -230,7 +230,7 @@ MIN_REPEAT_PROBABILITY = 0.05
 
 The last of five cuts gains 4 % of the optimum. A wrong label costs 20 %."""
 ASKED_CUT_ODDS = 3
-"""Factor on the odds of a wrong verdict of the cut that is asked about, for the last cut; chosen.
+"""Factor on the odds of a wrong verdict of the questioned cut, for the last cut; chosen.
 
 If the verdict is right, the last cut gains 1 or 2 % of the optimum, if it is wrong up to 20 %."""
 MIN_EXPECTED_GAIN = 0.005
@@ -280,7 +280,7 @@ def suggest_cut(
 
     A cut with a doubtful verdict is repeated once, a stable one only while another cut is left. Else, a cut is worth
     its own gain and the expected gain of the best next one. The best rate so far counts where its cut is truly stable.
-    The last cut also has to gain where the stable cut that is asked about chattered. The zero-order approximation
+    The last cut also has to gain where the questioned stable cut chattered. The zero-order approximation
     proposes. Semi-discretization evaluates the chosen cut.
 
     cuts: those of this program. left: test cuts still to be made, this one included. rejected: cuts with a rejected
@@ -332,7 +332,7 @@ def _find_repeat(
 
 
 def find_cut_to_ask(posterior: Posterior, cuts: Sequence[CutEvidence]) -> CutEvidence | None:
-    """Find the stable cut whose verdict is asked about by name, or None.
+    """Find the stable cut that is questioned by name, or None.
 
     Three deeper cuts chatter, or it is the best one and doubtful enough. The answer needs no cut.
     """

@@ -15,11 +15,10 @@ from lobewatch.cuts.learning.cut_likelihood import (
     CutEvidence,
     CutPrediction,
     PowerEvidence,
-    find_questioned_cut,
-    is_setting_taken,
     predict_cut,
 )
 from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.learning.repeated_cuts import find_questioned_cut, is_setting_taken
 from lobewatch.cuts.learning.suggestion import (
     MIN_CANDIDATE_DISTANCE,
     CutGrid,

@@ -10,15 +10,10 @@ from lobes import Cut, lower_envelope, stability_boundary, zero_order_lobes
 from lobewatch.arrays import Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection.spectrum import fold_frequency
 from lobewatch.cuts.learning import cut_likelihood
-from lobewatch.cuts.learning.cut_likelihood import (
-    CutEvidence,
-    find_cut_to_repeat,
-    find_questioned_cut,
-    is_setting_taken,
-    predict_cut,
-)
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, predict_cut
 from lobewatch.cuts.learning.posterior import Posterior, wrong_label_probability
 from lobewatch.cuts.learning.prior_samples import SpindleSamples
+from lobewatch.cuts.learning.repeated_cuts import find_cut_to_repeat, find_questioned_cut, is_setting_taken
 from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.machine.settings.drive_power import DEPTH_STEP_MM, STEP_ROUNDING, round_down_depth_mm
 from lobewatch.tool.principal_directions import TipModes

@@ -10,10 +10,11 @@ import pytest
 
 from lobewatch.arrays import Floats
 from lobewatch.cuts.learning import suggestion
-from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, find_questioned_cut, predict_cut
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence, PowerEvidence, predict_cut
 from lobewatch.cuts.learning.posterior import build_prior
 from lobewatch.cuts.learning.process_damping import ProcessDamping
 from lobewatch.cuts.learning.production_ladder import MAX_CUT_RISK, N_LADDER_SAMPLES, Ladder, find_ladder
+from lobewatch.cuts.learning.repeated_cuts import find_questioned_cut
 from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from lobewatch.verdicts.zero_order_batch import ZeroOrderBatch
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from lobewatch.cuts.learning import suggestion
-from lobewatch.cuts.learning.cut_likelihood import CutEvidence, find_cut_to_repeat, is_setting_taken
+from lobewatch.cuts.learning.cut_likelihood import CutEvidence
 from lobewatch.cuts.learning.posterior import find_inconsistent_cuts
+from lobewatch.cuts.learning.repeated_cuts import find_cut_to_repeat, is_setting_taken
 from lobewatch.cuts.learning.suggestion import CutGrid, find_cut_to_ask, suggest_cut
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 

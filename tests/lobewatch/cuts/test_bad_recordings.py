@@ -90,6 +90,11 @@ def test_what_is_no_usable_cut_gets_no_verdict(kind: str, seeds: Sequence[int]) 
     assert {one.reason for one in heard if one.verdict == "cannot tell"} <= reasons
 
 
+def test_a_speed_that_explains_few_of_many_lines_is_none() -> None:
+    """A comb near the set speed has 4 of the 69 lines of this music."""
+    assert music(np.random.default_rng(2)).verdict == "cannot tell"
+
+
 @pytest.mark.parametrize("chatters", [False, True])
 @pytest.mark.parametrize("seeds", [FEW, pytest.param(MANY, marks=pytest.mark.long)], ids=["few", "many"])
 def test_a_telephone_tells_what_lies_in_its_band(seeds: Sequence[int], chatters: bool) -> None:

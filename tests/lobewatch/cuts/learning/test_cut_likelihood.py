@@ -217,3 +217,13 @@ def test_by_semi_discretisation_kind_and_frequency_are_those_of_the_boundary() -
         folded = min(chatter % teeth, teeth - chatter % teeth)
         assert prediction.frequency[0] == pytest.approx(folded, abs=0.01 * teeth)
     assert kinds == {True, False}
+
+
+@pytest.mark.parametrize("depth", [1e-3, 4e-3])
+def test_a_cut_has_the_same_excess_with_and_without_its_frequency(depth: float) -> None:
+    """Growth and Floquet multipliers agree where the force changes with the angle."""
+    mill = Mill(cut=replace(SLOT, immersion=0.3))
+    told = CutEvidence(mill.cut, 9000, depth, "chatter", 900.0)
+    excess = [predict_cut(cut, middle(mill)).excess[0] for cut in (told, replace(told, frequency=math.nan))]
+    assert 0.01 < abs(excess[0]) < 4
+    assert excess[1] == pytest.approx(excess[0], rel=0.02)

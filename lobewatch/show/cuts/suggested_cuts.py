@@ -175,7 +175,7 @@ def _suggestion_reason(cut: Suggestion, next_cut: NextCut) -> str:
         is_accepted = cut.repeats in [made.id for made in next_cut.learning.accepted_cuts]
         return f"the cut repeats {cut.repeats}, which {'may be wrong' if is_accepted else 'contradicts the other cuts'}"
     if next_cut.asked is not None and cut.gain < 0:
-        return f"the cut gains if {next_cut.asked.id} chattered"
+        return f"a cut that is worth most if {next_cut.asked.id} chattered"
     return f"the cut determines mostly {factor_text(cut.most_informative)}"
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from lobewatch.arrays import Flags, Floats
 from lobewatch.cuts.learning.pocket_depth import PROGRAM_SPEED_TOLERANCE
-from lobewatch.cuts.learning.sampled_lobes import SampledLobes, sample_lobes
+from lobewatch.cuts.learning.sampled_lobes import MAX_LOBE_GAIN, SampledLobes, sample_lobes
 from lobewatch.machine.journal.entries import CutVerdict
 from lobewatch.machine.settings.drive_power import SPEED_STEP_RPM, round_down_depth_mm
 
@@ -27,12 +27,10 @@ CLASSIC_TOLERANCE = 0.025
 """Relative distance of the first suggested speed below that of the classic rule; chosen."""
 MAX_MODES = 4
 """Largest number of modes in a search; chosen."""
-LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.02
+LIMIT_UNCERTAINTY, FREQUENCY_UNCERTAINTY = 0.15, 0.03
 """Logarithmic uncertainty of a stability limit and of a chatter frequency; chosen."""
-UNEXPLAINED, SIDEBAND_LIKELIHOOD = 0.1, 0.4
+UNEXPLAINED, SIDEBAND_LIKELIHOOD = 0.1, 0.15
 """Likelihood of a chatter frequency of another cause, and of a side band, over that of the best one; chosen."""
-MAX_LOBE_GAIN = 20.0
-"""Largest limit over the lowest one that counts; chosen."""
 SPEED_STEP = 0.005
 """Relative step of the searched speeds; chosen."""
 SPEED_UNCERTAINTY = 0.01
@@ -257,7 +255,7 @@ def _explain_frequency(cut: HeardCut, teeth: int, expected: Floats) -> Floats:
 
 def _find_chance(weights: Floats, limits: Floats, depths: Floats) -> Floats:
     """Return the probability that a cut is stable at each speed, and at least half as deep as the best one."""
-    is_deep = depths >= np.minimum(np.max(limits, axis=1), MAX_LOBE_GAIN) / 2
+    is_deep = depths >= np.max(limits, axis=1) / 2
     return np.asarray(weights @ ((limits >= depths[:, np.newaxis]) & is_deep[:, np.newaxis]))
 
 
@@ -266,11 +264,12 @@ def _average_over_speeds(chance: Floats) -> Floats:
     return np.asarray(gaussian_filter1d(chance, SPEED_UNCERTAINTY / SPEED_STEP, mode="nearest"))
 
 
-def _find_pocket(level: Floats, place: int) -> slice:
-    """Return the places from the valley on one side of a speed to that on the other."""
-    rises = np.diff(level) > 0
-    left, right = np.flatnonzero(~rises[:place]), np.flatnonzero(rises[place:])
-    return slice(int(left.max(initial=-1)) + 1, place + int(right.min(initial=level.size - 1 - place)) + 1)
+def _find_pocket(chance: Floats, place: int) -> slice:
+    """Return the places around a speed from valley to valley, at most half as high as its chance."""
+    rises, is_low = np.diff(chance) > 0, chance < chance[place] / 2
+    left = np.flatnonzero(~rises[:place] & is_low[:place])
+    right = np.flatnonzero(rises[place:] & is_low[place:-1])
+    return slice(int(left.max(initial=-1)) + 1, place + int(right.min(initial=chance.size - 1 - place)) + 1)
 
 
 def _find_window(level: Floats, place: int) -> tuple[int, int]:

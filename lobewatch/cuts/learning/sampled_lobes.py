@@ -1,6 +1,6 @@
 """Stability lobes of a tool that nobody tapped: Monte Carlo samples of its modes and of the cut.
 
-Unknown values are drawn: stiffness, damping, a mode that has not chattered yet, radial depth,
+Unknown values are drawn: stiffness, damping, modes that have not chattered yet, radial depth,
 direction and Kr. Lobes are those of the zero-order approximation. Each sample counts by how well it explains the cuts.
 Sources: Altintas & Budak, CIRP Annals 44 (1995) 357-362; Karandikar, Traverso, Abbas & Schmitz, 2014.
 """
@@ -11,18 +11,19 @@ from functools import cache
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from lobes import Cut, Direction
 from lobes.tooth_force import mean_force
 from lobewatch.arrays import Complexes, Floats, Indices
 
-N_SAMPLES, SEED = 600, 0
+N_SAMPLES, SEED = 400, 0
 """Number of samples, chosen, and the seed that makes them the same each time."""
-HEARD_FREQUENCY_STD = 0.025
+HEARD_FREQUENCY_STD = 0.04
 """Relative standard deviation of a natural frequency around its first estimate; chosen."""
-UNHEARD_PROBABILITY, UNHEARD_FREQUENCY, UNHEARD_STIFFNESS = 0.4, (0.4, 2.5), (1.0, 6.0)
-"""Probability of one more mode, its frequency and stiffness over those of the first; chosen."""
+MAX_UNHEARD, UNHEARD_PROBABILITY = 2, 0.4
+"""Number of modes that have not chattered, at most, and the probability of each; chosen."""
+UNHEARD_FREQUENCY, UNHEARD_STIFFNESS = (0.4, 2.5), (1.0, 6.0)
+"""Range of their frequency and stiffness over those of the first mode; chosen."""
 RIGID = 1e6
 """Stiffness over that of the first mode of a mode that is not there; chosen."""
 HEARD_STIFFNESS = 2.7
@@ -35,18 +36,18 @@ IMMERSIONS = (0.1, 0.3, 0.6, 1.0)
 """Radial depths over diameter; chosen."""
 RADIAL_FORCES = (0.1, 0.5)
 """Range of Kr over Kt; chosen."""
-N_FREQUENCIES, LAST_PHASE = 161, 1.55
+N_FREQUENCIES, LAST_PHASE = 17, 1.5
 """Number of frequencies around each resonance, and the largest angle (rad), whose tangent is their distance.
 
 The distance is in half bandwidths."""
 LOWEST_FREQUENCY = 0.2
 """Lowest frequency over that of the slowest mode; chosen."""
-MAX_GAIN = 1e3
+MAX_LOBE_GAIN = 20.0
 """Largest limit over the lowest one that counts; chosen."""
 MAX_WAVES = 60
-"""Waves between two teeth above which all speeds have the lowest limit; pockets there are at most 20 % deeper."""
-GAP_SPEEDS = 13
-"""Number of speeds around one that no sampled frequency reaches, of which the lowest limit counts; chosen."""
+"""Waves between two teeth above which all speeds have the lowest limit.
+
+Pockets there are at most 20 % deeper on average over the uncertainty of the speed."""
 
 
 _Points: TypeAlias = tuple[Indices, Floats, Floats]
@@ -112,22 +113,22 @@ def sample_lobes(modes: Sequence[float], teeth: int, speeds: Floats) -> SampledL
     x = _draw_heard_and_unheard(draw, modes)
     y = _vary(draw, x)
     frequency = np.concatenate([x.near_resonances(), y.near_resonances()], axis=1)
-    frequency = np.maximum(frequency, LOWEST_FREQUENCY * np.min(x.frequency, axis=1, keepdims=True))
+    frequency = np.maximum(np.sort(frequency), LOWEST_FREQUENCY * np.min(x.frequency, axis=1, keepdims=True))
     eigenvalues = _loop_eigenvalues(_draw_forces(draw), x.receptance(frequency), y.receptance(frequency))
     return _lowest_limits(frequency, eigenvalues, teeth, speeds)
 
 
 def _draw_heard_and_unheard(draw: np.random.Generator, modes: Sequence[float]) -> SampledModes:
-    """Draw the modes in x: those that were heard, and with some probability one more."""
+    """Draw the modes in x: those that were heard, and up to two more."""
     count = len(modes)
     heard = np.array(modes) * np.exp(HEARD_FREQUENCY_STD * draw.normal(size=(N_SAMPLES, count)))
     stiffness = _log_uniform(draw, 1 / HEARD_STIFFNESS, HEARD_STIFFNESS, count)
     stiffness[:, 0] = 1
-    more = modes[0] * _log_uniform(draw, *UNHEARD_FREQUENCY, 1)
-    its_stiffness = _log_uniform(draw, *UNHEARD_STIFFNESS, 1)
-    its_stiffness[draw.uniform(size=N_SAMPLES) > UNHEARD_PROBABILITY] = RIGID
-    damping = draw.uniform(*DAMPING_RATIOS, (N_SAMPLES, count + 1))
-    return SampledModes(np.hstack([heard, more]), damping, np.hstack([stiffness, its_stiffness]))
+    more = modes[0] * _log_uniform(draw, *UNHEARD_FREQUENCY, MAX_UNHEARD)
+    more_stiffness = _log_uniform(draw, *UNHEARD_STIFFNESS, MAX_UNHEARD)
+    more_stiffness[draw.uniform(size=more.shape) > UNHEARD_PROBABILITY] = RIGID
+    damping = draw.uniform(*DAMPING_RATIOS, (N_SAMPLES, count + MAX_UNHEARD))
+    return SampledModes(np.hstack([heard, more]), damping, np.hstack([stiffness, more_stiffness]))
 
 
 def _vary(draw: np.random.Generator, modes: SampledModes) -> SampledModes:
@@ -165,7 +166,7 @@ def _loop_eigenvalues(force: Floats, x: Complexes, y: Complexes) -> tuple[Comple
 
 
 def _lowest_limits(frequency: Floats, loops: Sequence[Complexes], teeth: int, speeds: Floats) -> SampledLobes:
-    """Return the lowest limit of all lobes at each speed, and its frequency."""
+    """Return the lowest limit of all lobes at each speed, and its frequency, by rising frequencies."""
     limits, chatter = np.full((len(frequency), speeds.size), np.inf), np.full((len(frequency), speeds.size), np.nan)
     points = [point for loop in loops for point in _lobe_points(frequency, loop, teeth, speeds)]
     for place, depth, _ in points:
@@ -173,29 +174,44 @@ def _lowest_limits(frequency: Floats, loops: Sequence[Complexes], teeth: int, sp
     for place, depth, hz in points:
         is_lowest = depth <= limits.reshape(-1)[place]
         chatter.reshape(-1)[place[is_lowest]] = hz[is_lowest]
-    limits = np.where(np.isinf(limits), minimum_filter1d(limits, GAP_SPEEDS, axis=1), limits)
     lowest = np.min(limits, axis=1, keepdims=True)
     lowest[np.isinf(lowest)] = 1.0  # no lobe in the range: deep cuts are stable at all speeds
-    return SampledLobes(np.minimum(limits / lowest, MAX_GAIN), chatter)
+    return SampledLobes(np.minimum(limits / lowest, MAX_LOBE_GAIN), chatter)
 
 
 def _lobe_points(frequency: Floats, loop: Complexes, teeth: int, speeds: Floats) -> Iterator[_Points]:
-    """Yield each lobe up to `MAX_WAVES`, and the lowest limits above."""
-    sample, point = np.nonzero(loop.real < 0)
-    response, hz = loop[sample, point], frequency[sample, point]
-    depth, part = -1 / (2 * response.real), np.mod(np.angle(response) / np.pi - 0.5, 1)
+    """Yield each lobe up to `MAX_WAVES` at all speeds between its frequencies, and the lowest limits above."""
+    is_lobe = loop.real < 0
+    depth = -1 / (2 * np.where(is_lobe, loop.real, -np.inf))
     step = np.log(speeds[1] / speeds[0])
-    first = np.maximum(np.ceil(60 * hz / (teeth * speeds[-1]) * np.exp(-step / 2) - part), 0)
-    place, waves = np.log(60 * hz / teeth / speeds[0]) / step, part + first
-    last = np.minimum(np.floor(place - np.log(MAX_WAVES) / step), speeds.size - 1)
-    slow = np.flatnonzero(last >= 0)
-    yield _spread_lowest(sample[slow], last[slow].astype(np.intp), depth[slow], hz[slow], speeds.size)
-    while depth.size:
-        at = np.rint(place - np.log(np.maximum(waves, np.finfo(np.float64).tiny)) / step)
-        inside = (at >= 0) & (at < speeds.size)
-        yield sample[inside] * speeds.size + at[inside].astype(np.intp), depth[inside], hz[inside]
-        goes_on = (at >= 0) & (waves < MAX_WAVES)
-        sample, hz, depth, place, waves = (values[goes_on] for values in (sample, hz, depth, place, waves + 1))
+    place = np.log(60 * frequency / teeth / speeds[0]) / step  # with one wave
+    last = np.minimum(np.floor(place - np.log(MAX_WAVES) / step), speeds.size - 1).astype(np.intp)
+    slow = np.nonzero(is_lobe & (last >= 0))
+    yield _spread_lowest(slow[0], last[slow], depth[slow], frequency[slow], speeds.size)
+    sample, point = np.nonzero(is_lobe[:, 1:] & is_lobe[:, :-1])
+    part = np.mod(np.angle(loop) / np.pi - 0.5, 1)
+    places, parts, depths, hz = (
+        np.stack([x[sample, point], x[sample, point + 1]]) for x in (place, part, depth, frequency)
+    )
+    waves = parts + np.maximum(np.floor(np.exp(step * (np.min(places, axis=0) - speeds.size)) - 1), 0)
+    while sample.size:
+        ends = places - np.log(np.maximum(waves, np.finfo(np.float64).tiny)) / step
+        yield _interpolate(sample, ends, depths, hz, speeds.size)
+        goes_on = (np.max(ends, axis=0) >= 0) & (waves[0] < MAX_WAVES)
+        sample, places, waves, depths, hz = (x[..., goes_on] for x in (sample, places, waves + 1, depths, hz))
+
+
+def _interpolate(sample: Indices, ends: Floats, depths: Floats, hz: Floats, n_speeds: int) -> _Points:
+    """Interpolate depth and frequency at each speed between two neighbouring points of a lobe, shape (2, n) each."""
+    first = np.maximum(np.ceil(np.min(ends, axis=0)), 0)
+    last = np.minimum(np.floor(np.max(ends, axis=0)), n_speeds - 1)
+    count = np.maximum(last - first + 1, 0).astype(np.intp)
+    pair = np.repeat(np.arange(count.size), count)
+    speed = first[pair] + np.arange(pair.size) - np.repeat(np.cumsum(count) - count, count)
+    start, end = ends[:, pair]
+    share = (speed - start) / np.where(end == start, 1, end - start)
+    depth, frequency = (x[0, pair] + share * (x[1, pair] - x[0, pair]) for x in (depths, hz))
+    return sample[pair] * n_speeds + speed.astype(np.intp), depth, frequency
 
 
 def _spread_lowest(sample: Indices, last: Indices, depth: Floats, hz: Floats, n_speeds: int) -> _Points:

@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.chatter_detection import load_ripple
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
 from lobewatch.cuts.chatter_detection.peak_classification import find_cut_peaks
@@ -14,7 +15,6 @@ from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
     SpindleSpeed,
     find_comb,
     find_comb_by_sum,
-    refine_comb,
     refine_speed,
 )
 
@@ -53,8 +53,6 @@ VOTE_PEAK_WIDTH = 9
 """Number of grid steps around each compared speed."""
 MIN_GRID_SHARE = 0.5
 """Smallest share of peaks on the harmonic grid, and of peaks with a neighbor one or two turns or teeth away."""
-RIPPLE_DISTANCE = 30.0
-"""Distance between peaks without side bands of ripple (Hz), as these are nearer."""
 RIPPLE_EDGE = 8.0
 """Amplitude of a side band of ripple over its peak times their distance, at most (Hz); chosen.
 
@@ -105,7 +103,7 @@ def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: fl
     if speed is not None and speed.misfit < MAX_SPEED_MISFIT:
         return speed
     for edge in (0.0, RIPPLE_EDGE):
-        peaks = find_cut_peaks(spectra, air, RIPPLE_DISTANCE, edge)
+        peaks = find_cut_peaks(spectra, air, load_ripple.MAX_RIPPLE_FREQUENCY, edge)
         unique = find_unique_speed(peaks, spectra[0].bin_width, teeth, commanded)
         if unique is not None and (speed is None or unique.agreeing > speed.agreeing):
             return unique
@@ -155,7 +153,7 @@ def _find_speed_by_peaks(spectra: Spectra, of_cut: SpectralPeaks, teeth: int, co
 
 def find_unique_speed(peaks: SpectralPeaks, bin_width: float, teeth: int, commanded: float) -> SpindleSpeed | None:
     """Find the spindle frequency (Hz) near the commanded one that has far more votes than any other, or None."""
-    loudest = _remove_slow_comb(peaks, bin_width).loudest(combs.MAX_COMB_PEAKS)
+    loudest = load_ripple.remove_slow_comb(peaks, bin_width, commanded).loudest(combs.MAX_COMB_PEAKS)
     if len(loudest) < 2:
         return None
     grid, votes = _vote(loudest, bin_width, teeth, commanded)
@@ -175,15 +173,6 @@ def _fits_teeth(speed: SpindleSpeed, peaks: SpectralPeaks, bin_width: float, tee
     steps = np.concatenate([harmonics.order, *(family.order - family.order[0] for family in others)])
     common = int(np.gcd.reduce(steps.astype(np.int64)))
     return common > 0 and teeth % common == 0
-
-
-def _remove_slow_comb(peaks: SpectralPeaks, bin_width: float) -> SpectralPeaks:
-    """Remove the harmonics of a load that steps slowly, if most peaks are some."""
-    slow = peaks[peaks.frequency < RIPPLE_DISTANCE].loudest(1)
-    steps = refine_comb(float(slow.frequency[0]), peaks, bin_width) if len(slow) else None
-    if steps is None or steps.share < MIN_GRID_SHARE:
-        return peaks
-    return peaks[fold_frequency(peaks.frequency, steps.frequency) > spectral.PEAK_TOLERANCE * bin_width]
 
 
 def find_speed_by_votes(

@@ -170,9 +170,10 @@ def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> 
 
 def _remove_ripple(axis: CutAxis, peaks: PeaksByOrigin) -> PeaksByOrigin:
     """Remove side bands of ripple, and what is below the lowest frequency of chatter, from unexplained peaks."""
-    left = peaks.unexplained[peaks.unexplained.frequency >= axis.known.lowest]
+    left = load_ripple.remove_slow_comb(peaks.unexplained, axis.spectrum.bin_width, axis.turn)
+    left = left[left.frequency >= axis.known.lowest]
     if len(left) and len(peaks.comb):
-        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, axis.spectrum, axis.turn)
+        is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, axis.spectrum, axis.turn, axis.ripple)
         ripple, rest = left[is_ripple].energy, left[~is_ripple]
         beyond = axis.ripple.energy_beyond(rest, axis.turn, axis.spectrum.bin_width) if axis.ripple else 0.0
         is_more = rest.energy > MIN_CHATTER_OVER_RIPPLE * ripple or beyond > MIN_BEYOND_RIPPLE * ripple

@@ -13,6 +13,7 @@ import scipy
 from lobewatch.arrays import Complexes, Flags, Floats, Indices
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import refine_comb
 
 MAX_RIPPLE_FREQUENCY = 30.0
 """Highest frequency of a ripple (Hz): ball screws, ribs and small circles are slower."""
@@ -222,12 +223,15 @@ OWN_SIDEBAND_BINS = 4.0
 """Distance from a multiple within which there is no side band of another one (bins), half the main lobe."""
 
 
-def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> Flags:
+def find_ripple_peaks(
+    left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectrum, turn: float, ripple: Ripple | None
+) -> Flags:
     """Return whether each peak is a side band of ripple: most multiples have it, relative to their amplitudes.
 
-    left: peaks that are no multiples of the spindle frequency `turn` (Hz); comb: those that are. A peak up to
-    `MAX_LOAD_DISTANCE` from a multiple that is louder, or that has a like peak on its other side, is a slow change of
-    the load. Result of shape (n,).
+    left: peaks that are no multiples of the spindle frequency `turn` (Hz); comb: those that are; ripple: if it is
+    known, of which a mode may amplify the first side band of one multiple. A peak up to `MAX_LOAD_DISTANCE` from a
+    multiple that is louder, or that has a like peak on its other side, is a slow change of the load. Result of shape
+    (n,).
     """
     comb = _join_first_order(comb, spectrum, turn)
     beyond = left.frequency[:, np.newaxis] - comb.frequency
@@ -244,7 +248,9 @@ def find_ripple_peaks(left: SpectralPeaks, comb: SpectralPeaks, spectrum: Spectr
     is_load = np.abs(left.frequency - nearest) < MAX_LOAD_DISTANCE
     is_load &= np.max(louder, axis=0) > left.amplitude
     is_usual = (usual > least) & _has_nearer(usual, distance, comb, spectrum, turn)
-    return np.asarray((np.bincount(peak, is_pair | is_usual, len(left)) > 0) | is_load)
+    beyond_first = np.abs(left.frequency - nearest) - (ripple.frequency if ripple else np.inf)
+    is_first = np.abs(beyond_first) < spectral.PEAK_TOLERANCE * spectrum.bin_width
+    return np.asarray((np.bincount(peak, is_pair | is_usual, len(left)) > 0) | is_load | is_first)
 
 
 def _join_first_order(comb: SpectralPeaks, spectrum: Spectrum, turn: float) -> SpectralPeaks:
@@ -293,6 +299,25 @@ def widen_air(air: Spectrum) -> Spectrum:
     """Return the spectrum of air whose lines are as wide as sampling at equal angles makes them."""
     wide = 2 * round(MAX_RIPPLE_FREQUENCY / air.frequency[1]) + 1
     return air._replace(power=scipy.ndimage.maximum_filter1d(air.power, wide))
+
+
+MIN_SLOW_SHARE, MIN_SLOW_BINS = 0.6, 10.0
+"""Smallest share of peaks that are multiples of a slow line, and smallest frequency of it (bins); chosen.
+
+A quarter of all peaks are multiples of a line at ten bins by chance."""
+
+
+def remove_slow_comb(peaks: SpectralPeaks, bin_width: float, turn: float) -> SpectralPeaks:
+    """Remove the multiples of a load that steps slowly, if most peaks are some; all in Hz.
+
+    turn: spindle frequency; a line of which that is a multiple is none of the load, but chatter of several turns.
+    """
+    is_slow = (peaks.frequency < MAX_RIPPLE_FREQUENCY) & (peaks.frequency > MIN_SLOW_BINS * bin_width)
+    slow, reach = peaks[is_slow].loudest(1), spectral.PEAK_TOLERANCE * bin_width
+    steps = refine_comb(float(slow.frequency[0]), peaks, bin_width) if len(slow) else None
+    if steps is None or steps.share < MIN_SLOW_SHARE or spectral.fold_frequency(turn, steps.frequency) < reach:
+        return peaks
+    return peaks[spectral.fold_frequency(peaks.frequency, steps.frequency) > reach]
 
 
 UNEVEN_MARGIN = 3.0

@@ -139,9 +139,9 @@ def _bins_around(middle: Floats, reach: int, last: int) -> Indices:
     return np.asarray(np.clip(np.round(middle).astype(np.intp)[:, np.newaxis] + np.arange(-reach, reach + 1), 0, last))
 
 
-def find_cut_peaks(spectra: Spectra, air: Spectra, distance: float = 0.0) -> SpectralPeaks:
-    """Find the peaks of all axes that are not in air, without skirts; distance: between them, at least (Hz)."""
-    peaks = [spectral.find_separate_peaks(spectrum, distance) for spectrum in spectra]
+def find_cut_peaks(spectra: Spectra, air: Spectra, distance: float = 0.0, edge: float = 0.0) -> SpectralPeaks:
+    """Find the peaks of all axes that are not in air; distance and edge as for `find_separate_peaks` (Hz)."""
+    peaks = [spectral.find_separate_peaks(spectrum, distance, edge) for spectrum in spectra]
     return spectral.join_peaks([axis[~is_in_air(axis, quiet)] for axis, quiet in zip(peaks, air, strict=True)])
 
 

@@ -168,8 +168,14 @@ def find_peaks(spectrum: Spectrum, clear: float = MIN_PEAK_POWER) -> SpectralPea
     return SpectralPeaks((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
 
 
-def find_separate_peaks(spectrum: Spectrum, distance: float = 0.0) -> SpectralPeaks:
-    """Find peaks without those on the skirts of others; distance: from any louder peak, at least (Hz)."""
+def find_separate_peaks(spectrum: Spectrum, distance: float = 0.0, edge: float = 0.0) -> SpectralPeaks:
+    """Find peaks without those on the skirts of others.
+
+    distance: from any louder peak, at least (Hz); edge: smallest amplitude over that of another peak times their
+    distance (Hz).
+    """
     peaks = remove_skirts(find_peaks(spectrum), spectrum.bin_width)
-    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency) < distance
-    return peaks[~np.any(apart & (peaks.amplitude > peaks.amplitude[:, np.newaxis]), axis=1)]
+    apart = np.abs(peaks.frequency[:, np.newaxis] - peaks.frequency)
+    least = np.where(apart < distance, 1.0, edge / np.maximum(apart, spectrum.bin_width))
+    np.fill_diagonal(least, 0.0)
+    return peaks[np.all(peaks.amplitude[:, np.newaxis] >= least * peaks.amplitude, axis=1)]

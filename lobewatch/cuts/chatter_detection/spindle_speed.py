@@ -6,11 +6,17 @@ import numpy as np
 import scipy
 
 from lobewatch.arrays import Floats, Indices
+from lobewatch.cuts.chatter_detection import load_ripple
 from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
 from lobewatch.cuts.chatter_detection.peak_classification import find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, fold_frequency
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed, find_comb, find_comb_by_sum, refine_speed
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
+    SpindleSpeed,
+    find_comb,
+    find_comb_by_sum,
+    refine_speed,
+)
 
 COMB_SPEED_TOLERANCE = 0.05
 """Relative distance from the commanded speed within which a plain comb is searched."""
@@ -47,8 +53,14 @@ VOTE_PEAK_WIDTH = 9
 """Number of grid steps around each compared speed."""
 MIN_GRID_SHARE = 0.5
 """Smallest share of peaks on the harmonic grid, and of peaks with a neighbor one or two turns or teeth away."""
-RIPPLE_DISTANCE = 30.0
-"""Distance between peaks by which a speed is searched again (Hz), as side bands of ripple are nearer."""
+RIPPLE_EDGE = 8.0
+"""Amplitude of a side band of ripple over its peak times their distance, at most (Hz); chosen.
+
+A loudness that steps by 40 % up and down at 30 Hz has 0.25 over m at each odd multiple m."""
+VOTE_PEAK_REACH = 1.5e-3
+"""Relative distance from a speed up to which votes are its own; chosen."""
+MIN_VOTE_RATIO = 1.5
+"""Votes of a speed over those of any other from which it is the only one; chosen."""
 MIN_CLEAR_PEAKS, MIN_EXPLAINED_SHARE = 20, 0.15
 """Number of clear peaks from which a speed must explain some, and smallest share of them, as music has many; chosen."""
 MIN_AGREEING_PEAKS = 3
@@ -86,14 +98,16 @@ def _count_same(speed: SpindleSpeed, others: Sequence[SpindleSpeed]) -> int:
 
 
 def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
-    """Find the speed of all axes together; if it fits badly, once more without side bands of ripple."""
-    speed = _find_speed(spectra, air, teeth, commanded, 0.0)
+    """Find the speed of all axes together; if it fits badly, without side bands of ripple where that explains more."""
+    speed = _find_speed(spectra, air, teeth, commanded)
     if speed is not None and speed.misfit < MAX_SPEED_MISFIT:
         return speed
-    plain = _find_speed(spectra, air, teeth, commanded, RIPPLE_DISTANCE)
-    if speed is None or plain is None or _count_same(plain, [speed]):
-        return speed or plain
-    return min(speed, plain, key=lambda each: each.misfit)
+    for edge in (0.0, RIPPLE_EDGE):
+        peaks = find_cut_peaks(spectra, air, load_ripple.MAX_RIPPLE_FREQUENCY, edge)
+        unique = find_unique_speed(peaks, spectra[0].bin_width, teeth, commanded)
+        if unique is not None and (speed is None or unique.agreeing > speed.agreeing):
+            return unique
+    return speed
 
 
 def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> SpindleSpeed | None:
@@ -105,10 +119,10 @@ def follow_speed(spectra: Spectra, air: Spectra, known: SpindleSpeed) -> Spindle
     return speed if speed.agreeing >= MIN_SURE_VOTES else None
 
 
-def _find_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float, distance: float) -> SpindleSpeed | None:
-    """Find the spindle frequency (Hz); distance: of separate peaks, at least (Hz)."""
-    peaks = find_cut_peaks(spectra, air, distance)
-    voted = _find_speed_by_peaks(spectra, air, teeth, commanded, distance)
+def _find_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
+    """Find the spindle frequency (Hz)."""
+    peaks = find_cut_peaks(spectra, air)
+    voted = _find_speed_by_peaks(spectra, peaks, teeth, commanded)
     summed = find_comb_by_sum(spectra, air, peaks, teeth, commanded, COMB_SPEED_TOLERANCE, USUAL_SPEED_TOLERANCE)
     if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE:
         found = voted or summed
@@ -123,12 +137,9 @@ def _explains(speed: SpindleSpeed, peaks: SpectralPeaks, bin_width: float) -> bo
     return len(peaks) < MIN_CLEAR_PEAKS or refine_speed(speed.frequency, peaks, bin_width).share >= MIN_EXPLAINED_SHARE
 
 
-def _find_speed_by_peaks(
-    spectra: Spectra, air: Spectra, teeth: int, commanded: float, distance: float
-) -> SpindleSpeed | None:
-    """Find the speed by peaks clear of the noise."""
-    peaks = [spectral.find_separate_peaks(spectrum, distance) for spectrum in spectra]
-    of_cut, first = find_cut_peaks(spectra, air, distance), spectra[0]
+def _find_speed_by_peaks(spectra: Spectra, of_cut: SpectralPeaks, teeth: int, commanded: float) -> SpindleSpeed | None:
+    """Find the speed by peaks clear of the noise; of_cut: those that are not in air."""
+    peaks, first = [spectral.find_separate_peaks(spectrum) for spectrum in spectra], spectra[0]
     voted = find_speed_by_votes(of_cut, spectral.join_peaks(peaks), first, teeth, commanded)
     comb = find_comb(of_cut, first.bin_width, first.sample_rate, teeth, commanded, COMB_SPEED_TOLERANCE)
     if comb is None:
@@ -138,6 +149,30 @@ def _find_speed_by_peaks(
         is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME_SPEED_TOLERANCE
         return voted if is_same else comb if comb.share >= MIN_GRID_SHARE else None
     return voted
+
+
+def find_unique_speed(peaks: SpectralPeaks, bin_width: float, teeth: int, commanded: float) -> SpindleSpeed | None:
+    """Find the spindle frequency (Hz) near the commanded one that has far more votes than any other, or None."""
+    loudest = load_ripple.remove_slow_comb(peaks, bin_width, commanded).loudest(combs.MAX_COMB_PEAKS)
+    if len(loudest) < 2:
+        return None
+    grid, votes = _vote(loudest, bin_width, teeth, commanded)
+    best = int(np.argmax(votes))
+    others = votes[np.abs(grid / grid[best] - 1) > VOTE_PEAK_REACH]
+    if votes[best] <= MIN_VOTE_RATIO * np.max(others):
+        return None
+    speed = refine_speed(float(grid[best]), loudest, bin_width)
+    is_sure = _spaced_share(loudest, speed.frequency, teeth, bin_width) >= MIN_GRID_SHARE
+    return speed if is_sure and _fits_teeth(speed, loudest, bin_width, teeth) else None
+
+
+def _fits_teeth(speed: SpindleSpeed, peaks: SpectralPeaks, bin_width: float, teeth: int) -> bool:
+    """Return whether peaks are multiples of a turn or a tooth apart, not of another part of a chatter frequency."""
+    tolerance = combs.GRID_TOLERANCES[-1] * bin_width
+    harmonics, *others = combs.find_sideband_families(speed.frequency, peaks, tolerance)
+    steps = np.concatenate([harmonics.order, *(family.order - family.order[0] for family in others)])
+    common = int(np.gcd.reduce(steps.astype(np.int64)))
+    return common > 0 and teeth % common == 0
 
 
 def find_speed_by_votes(
@@ -153,9 +188,7 @@ def find_speed_by_votes(
     if len(loudest) < 2:
         return None
     bin_width = spectrum.bin_width
-    step = VOTE_GRID_STEP * VOTE_WIDTH * bin_width / (FINEST_VOTE_HARMONIC * commanded)
-    grid = commanded * (1 + np.arange(-VOTE_SPEED_TOLERANCE, VOTE_SPEED_TOLERANCE, step))
-    votes = _count_votes(loudest, grid, teeth, VOTE_WIDTH * bin_width)
+    grid, votes = _vote(loudest, bin_width, teeth, commanded)
     if not np.any(votes):
         return None
     turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < VOTE_SPEED_TOLERANCE]
@@ -183,6 +216,13 @@ def _vote_peaks(votes: Floats) -> Indices:
     """Return the places of local maxima of the votes, the most votes first."""
     places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, VOTE_PEAK_WIDTH) == votes) & (votes > 0))
     return places[np.argsort(-votes[places])[:MAX_RIVAL_SPEEDS]]
+
+
+def _vote(peaks: SpectralPeaks, bin_width: float, teeth: int, commanded: float) -> tuple[Floats, Floats]:
+    """Return frequencies near the commanded one (Hz) and the votes of peaks for each."""
+    step = VOTE_GRID_STEP * VOTE_WIDTH * bin_width / (FINEST_VOTE_HARMONIC * commanded)
+    grid = commanded * (1 + np.arange(-VOTE_SPEED_TOLERANCE, VOTE_SPEED_TOLERANCE, step))
+    return grid, _count_votes(peaks, grid, teeth, VOTE_WIDTH * bin_width)
 
 
 def _count_votes(peaks: SpectralPeaks, grid: Floats, teeth: int, sharpness: float) -> Floats:

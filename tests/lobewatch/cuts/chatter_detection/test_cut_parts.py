@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from lobewatch.cuts.chatter_detection import earlier_air
 from lobewatch.cuts.chatter_detection.cut_evaluation import CutEvaluation, CutRecording, evaluate_recording
 from lobewatch.cuts.chatter_detection.cut_windows import HeardWindow, join_windows
-from lobewatch.cuts.chatter_detection.load_ripple import compute_evenness, find_ripple_peaks
+from lobewatch.cuts.chatter_detection.load_ripple import Ripple, compute_evenness, find_ripple_peaks, remove_slow_comb
 from lobewatch.cuts.chatter_detection.peak_classification import (
     ChatterPeaks,
     classify_peaks,
@@ -167,8 +167,20 @@ def test_side_bands_of_one_multiple_are_no_ripple() -> None:
     signal = signal + 1e-4 * np.random.default_rng(0).normal(size=time.size)
     left = SpectralPeaks(np.array([408.0, 808.0, 813.0, 1208.0]), np.full(4, 0.1), np.full(4, 1e6))
     comb = SpectralPeaks(multiples, np.ones(3), np.full(3, 1e6))
-    found = find_ripple_peaks(left, comb, compute_spectrum(signal, RATE), 100.0)
-    assert not found[2]
+    spectrum = compute_spectrum(signal, RATE)
+    assert not find_ripple_peaks(left, comb, spectrum, 100.0, None)[2]
+    assert not find_ripple_peaks(left, comb, spectrum, 100.0, Ripple(8.0, 0.1, 0.0))[2]
+    assert find_ripple_peaks(left, comb, spectrum, 100.0, Ripple(13.0, 0.1, 0.0))[2]
+
+
+@pytest.mark.parametrize(("multiples", "turn", "is_slow"), [(12, 130.0, True), (12, 96.0, False), (6, 130.0, False)])
+def test_multiples_of_a_load_that_steps_are_left_out(multiples: int, turn: float, is_slow: bool) -> None:
+    """24 Hz; lines of which the turn is a multiple are chatter of several turns, and few may fit by chance."""
+    others = np.array([713.0, 1291.0, 1733.0, 2206.0, 3127.0, 3997.0])
+    frequency = np.concatenate([24.0 * np.arange(1, multiples + 1) ** 2, others])
+    peaks = SpectralPeaks(frequency, np.ones(frequency.size), np.full(frequency.size, 1e6))
+    left = remove_slow_comb(peaks, 0.5, turn)
+    assert left.frequency.tolist() == (others if is_slow else frequency).tolist()
 
 
 def find_ripple_beside(multiples: Floats, bands: dict[float, float]) -> list[bool]:
@@ -182,7 +194,7 @@ def find_ripple_beside(multiples: Floats, bands: dict[float, float]) -> list[boo
     left = SpectralPeaks(beside, loud, np.full(beside.size, 1e6))
     comb = multiples > 100.0
     known = SpectralPeaks(multiples[comb], amplitude[comb], np.full(np.count_nonzero(comb), 1e6))
-    return [bool(found) for found in find_ripple_peaks(left, known, compute_spectrum(signal, RATE), 100.0)]
+    return [bool(found) for found in find_ripple_peaks(left, known, compute_spectrum(signal, RATE), 100.0, None)]
 
 
 def test_chatter_40_hz_from_all_multiples_is_no_ripple_unless_it_is_a_harmonic_of_one() -> None:
@@ -203,7 +215,7 @@ def test_a_pair_next_to_a_multiple_that_a_corner_cancels_is_the_load(lines: tupl
     signal = signal + 1e-4 * np.random.default_rng(0).normal(size=time.size)
     left = SpectralPeaks(multiple + np.array(lines), np.ones(len(lines)), np.full(len(lines), 1e6))
     comb = SpectralPeaks(np.array([400.0]), np.ones(1), np.full(1, 1e6))
-    found = find_ripple_peaks(left, comb, compute_spectrum(np.asarray(signal), RATE), 100.0)
+    found = find_ripple_peaks(left, comb, compute_spectrum(np.asarray(signal), RATE), 100.0, None)
     assert list(found) == [is_load] * len(lines)
 
 

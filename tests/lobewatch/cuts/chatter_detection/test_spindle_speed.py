@@ -13,6 +13,7 @@ from lobewatch.cuts.chatter_detection.spindle_speed import (
     choose_common_speed,
     find_speed_by_votes,
     find_speed_of_spectra,
+    find_unique_speed,
 )
 from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed
 
@@ -73,6 +74,29 @@ def test_lines_must_have_another_one_or_two_turns_or_teeth_away() -> None:
     assert np.isnan(speed_of([k * TURN for k in (4, 7, 18, 31, 45)], TURN * 1.002))
     assert speed_of([k * TURN for k in (4, 8, 9, 13, 21)], TURN * 1.002) == pytest.approx(TURN, rel=1e-9)
     assert speed_of([k * TURN for k in (3, 5, 20, 28)], TURN * 1.002) == pytest.approx(TURN, rel=1e-9)
+
+
+STRAYS = (317.31, 1093.77, 1531.19, 2713.43, 3391.71, 4177.93, 5519.87, 6120.71, 6607.43, 7213.13, 7789.91)
+
+
+@pytest.mark.parametrize("off", [-0.015, 0.003, 0.015])
+def test_a_speed_with_a_clear_lead_in_votes_is_found_among_strays(off: float) -> None:
+    """Two tones of chatter with side bands one tooth apart, among as many strays."""
+    chatter = [tone + k * TURN for tone in (1712.3, 1833.7) for k in (-8, -4, 0, 4, 8, 12)]
+    speed = find_unique_speed(lines([*chatter, *STRAYS]), BIN, 4, TURN / (1 + off))
+    assert speed is not None
+    assert speed.frequency == pytest.approx(TURN, rel=1e-5)
+    assert find_unique_speed(lines(STRAYS), BIN, 4, TURN / (1 + off)) is None
+    assert find_unique_speed(lines([*chatter[:5], *STRAYS]), BIN, 4, TURN / (1 + off)) is None
+
+
+def test_multiples_of_chatter_alone_are_no_speed_of_other_teeth() -> None:
+    """A fifth of the chatter frequency is near the set speed, but four teeth make no fifth multiples only."""
+    chatter = [5 * k * TURN for k in range(1, 9)]
+    assert find_unique_speed(lines(chatter), BIN, 4, TURN) is None
+    speed = find_unique_speed(lines(chatter), BIN, 5, TURN)
+    assert speed is not None
+    assert speed.frequency == pytest.approx(TURN, rel=1e-9)
 
 
 def spectra_of(*axes: Sequence[tuple[float, float]], seconds: float = 1.0) -> tuple[list[Spectrum], list[Spectrum]]:

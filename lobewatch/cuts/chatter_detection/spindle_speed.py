@@ -11,12 +11,7 @@ from lobewatch.cuts.chatter_detection import spectrum as spectral
 from lobewatch.cuts.chatter_detection import tooth_passing_comb as combs
 from lobewatch.cuts.chatter_detection.peak_classification import find_cut_peaks
 from lobewatch.cuts.chatter_detection.spectrum import Spectra, SpectralPeaks, Spectrum, fold_frequency
-from lobewatch.cuts.chatter_detection.tooth_passing_comb import (
-    SpindleSpeed,
-    find_comb,
-    find_comb_by_sum,
-    refine_speed,
-)
+from lobewatch.cuts.chatter_detection.tooth_passing_comb import SpindleSpeed, find_comb, find_comb_by_sum, refine_speed
 
 COMB_SPEED_TOLERANCE = 0.05
 """Relative distance from the commanded speed within which a plain comb is searched."""

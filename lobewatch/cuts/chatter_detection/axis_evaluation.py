@@ -20,6 +20,10 @@ MIN_CHATTER_ENERGY = 5e-4
 """Energy of unexplained peaks over that of the comb, above which a cut with sidebands chatters."""
 MIN_SINGLE_PEAK_ENERGY = 1e-2
 """Energy of unexplained peaks over that of the comb, above which a cut without sidebands chatters."""
+MIN_SURE_SHARE = 0.75
+"""Smallest share of the peaks explained by a speed, below which chatter must be as loud as without sidebands."""
+MAX_CHATTER_FREQUENCY = 10e3
+"""Highest frequency of chatter (Hz): codecs fill the band above with copies of lower lines; chosen."""
 MAX_STABLE_ENERGY = 2e-4
 """Energy of unexplained peaks over that of the comb, below which a cut is stable."""
 MIN_CHATTER_OVER_RIPPLE = 1.5
@@ -125,7 +129,7 @@ def _evaluate_unexplained(axis: CutAxis, sound: CutEvaluation, peaks: PeaksByOri
     sound = sound._replace(energy_ratio=ratio)
     if ratio < MAX_STABLE_ENERGY:
         return _evaluate_stable(axis, sound, peaks)
-    if ratio < least_energy(chatter):
+    if ratio < least_energy(chatter, axis.speed):
         return sound._replace(verdict="cannot tell", reason="faint")
     chatter, reason = _choose_family(axis, left, chatter, ratio < MIN_SINGLE_PEAK_ENERGY)
     if reason:
@@ -155,9 +159,10 @@ def _choose_family(axis: CutAxis, left: SpectralPeaks, named: ChatterPeaks, is_f
     return named, reasons[0]
 
 
-def least_energy(chatter: ChatterPeaks) -> float:
-    """Return the smallest energy of unexplained peaks over that of the comb that is chatter."""
-    return MIN_CHATTER_ENERGY if len(chatter.peaks) >= classification.MIN_SIDEBANDS else MIN_SINGLE_PEAK_ENERGY
+def least_energy(chatter: ChatterPeaks, speed: SpindleSpeed) -> float:
+    """Return the smallest energy of unexplained peaks over that of the comb that is chatter at a speed."""
+    is_proven = len(chatter.peaks) >= classification.MIN_SIDEBANDS and speed.share >= MIN_SURE_SHARE
+    return MIN_CHATTER_ENERGY if is_proven else MIN_SINGLE_PEAK_ENERGY
 
 
 def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> float:
@@ -169,9 +174,9 @@ def _share_at_end(chatter: ChatterPeaks, signal: Floats, sample_rate: float) -> 
 
 
 def _remove_ripple(axis: CutAxis, peaks: PeaksByOrigin) -> PeaksByOrigin:
-    """Remove side bands of ripple, and what is below the lowest frequency of chatter, from unexplained peaks."""
+    """Remove side bands of ripple, and what is below or above all chatter, from unexplained peaks."""
     left = load_ripple.remove_slow_comb(peaks.unexplained, axis.spectrum.bin_width, axis.turn)
-    left = left[left.frequency >= axis.known.lowest]
+    left = left[(left.frequency >= axis.known.lowest) & (left.frequency <= MAX_CHATTER_FREQUENCY)]
     if len(left) and len(peaks.comb):
         is_ripple = load_ripple.find_ripple_peaks(left, peaks.comb, axis.spectrum, axis.turn, axis.ripple)
         ripple, rest = left[is_ripple].energy, left[~is_ripple]

@@ -121,9 +121,9 @@ def _compare_axes(sounds: Sequence[CutEvaluation]) -> list[CutEvaluation]:
     combs = [0.0 if sound.peaks is None else sound.peaks.comb.energy for sound in sounds]
     loudest, compared = max(combs), list(sounds)
     for i, (sound, comb) in enumerate(zip(sounds, combs, strict=True)):
-        if sound.chatter is not None and comb < loudest:
+        if sound.chatter is not None and sound.spindle_speed is not None and comb < loudest:
             ratio = sound.energy_ratio * max(comb, MIN_COMB_ENERGY * loudest) / loudest
-            if ratio < least_energy(sound.chatter):
+            if ratio < least_energy(sound.chatter, sound.spindle_speed):
                 compared[i] = sound._replace(verdict="cannot tell", reason="faint", chatter=None, energy_ratio=ratio)
     return compared
 

@@ -93,15 +93,12 @@ def _count_same(speed: SpindleSpeed, others: Sequence[SpindleSpeed]) -> int:
 
 
 def _find_common_speed(spectra: Spectra, air: Spectra, teeth: int, commanded: float) -> SpindleSpeed | None:
-    """Find the speed of all axes together; if it fits badly, without side bands of ripple where that explains more."""
+    """Find the speed of all axes together, if need be without side bands of ripple."""
     speed = _find_speed(spectra, air, teeth, commanded)
-    if speed is not None and speed.misfit < MAX_SPEED_MISFIT:
-        return speed
     for edge in (0.0, RIPPLE_EDGE):
-        peaks = find_cut_peaks(spectra, air, load_ripple.MAX_RIPPLE_FREQUENCY, edge)
-        unique = find_unique_speed(peaks, spectra[0].bin_width, teeth, commanded)
-        if unique is not None and (speed is None or unique.agreeing > speed.agreeing):
-            return unique
+        if speed is None:
+            peaks = find_cut_peaks(spectra, air, load_ripple.MAX_RIPPLE_FREQUENCY, edge)
+            speed = find_unique_speed(peaks, spectra[0].bin_width, teeth, commanded)
     return speed
 
 

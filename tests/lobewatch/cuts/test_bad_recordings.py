@@ -127,6 +127,15 @@ def test_lossy_coding_makes_no_other_verdict(seeds: Sequence[int], codec: str, k
         assert hear(sound, cut.teeth, cut.rpm, rate).verdict in ("cannot tell", "chatter" if chatters else "stable")
 
 
+@pytest.mark.parametrize(("codec", "kbit", "seed"), [("libopus", 32, 2), ("aac", 24, 8)])
+def test_lines_that_a_codec_adds_are_no_chatter(codec: str, kbit: int, seed: int) -> None:
+    """Copies of tooth passing above 15 kHz, and three lines that fit side bands at a speed that fits badly."""
+    pytest.importorskip("av")
+    cut = draw_cut(np.random.default_rng(seed), False)
+    sound, rate = code_lossily(cut.sound, codec, kbit)
+    assert hear(sound, cut.teeth, cut.rpm, rate).chatter is None
+
+
 def test_two_harmonics_of_a_telephone_are_not_stable() -> None:
     """Tooth passing at 1170 Hz has its third harmonic above 3.4 kHz."""
     cut = draw_cut(np.random.default_rng(108), False)

@@ -360,3 +360,10 @@ def test_loud_lines_near_multiples_are_chatter_all_the_same() -> None:
     heard = listen(recorded(a_cut(chatter=28.03 * TURN, loud=30.0)))
     assert heard.verdict == "chatter"
     assert heard.chatter is not None
+
+
+def test_a_load_that_steps_is_no_chatter() -> None:
+    """Steps at 24 Hz make all its multiples, which a mode at 2400 Hz amplifies."""
+    steps = [(24.0 * m, 8.0 / m + 6.0 / (1 + (m - 100) ** 2 / 9)) for m in range(1, 150)]
+    signal = recorded(a_cut(6) + sines(steps, round(CUT * RATE), np.random.default_rng(3)))
+    assert listen(signal, 6).verdict == "stable"

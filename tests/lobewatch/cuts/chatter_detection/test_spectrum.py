@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lobewatch.cuts.chatter_detection.spectrum import compute_spectrum, find_peaks
+from lobewatch.cuts.chatter_detection.spectrum import compute_spectrum, find_peaks, find_separate_peaks
 
 pytestmark = pytest.mark.quick
 
@@ -51,3 +51,13 @@ def test_two_sines_are_distinguished_where_the_window_can(apart: float, count: i
         len(find_peaks(compute_spectrum(both + np.random.default_rng(2).normal(scale=1e-3, size=time.size), RATE)))
         == count
     )
+
+
+def test_faint_lines_next_to_a_loud_one_are_left_out_by_distance_and_by_edge() -> None:
+    """An edge of 8 Hz leaves out less than 0.08 at 100 Hz and less than 0.02 at 400 Hz, of a line of 1."""
+    time = np.arange(25600) / RATE
+    lines = {1000.0: 1.0, 1020.0: 0.5, 1100.0: 0.06, 1400.0: 0.06}
+    signal = sum(amplitude * np.sin(2 * np.pi * frequency * time) for frequency, amplitude in lines.items())
+    spectrum = compute_spectrum(signal + np.random.default_rng(2).normal(scale=1e-3, size=time.size), RATE)
+    for about, kept in (((), list(lines)), ((30.0,), [1000, 1100, 1400]), ((30.0, 8.0), [1000, 1400])):
+        assert find_separate_peaks(spectrum, *about).frequency == pytest.approx(kept, abs=0.1)

@@ -90,13 +90,18 @@ def test_a_speed_with_a_clear_lead_in_votes_is_found_among_strays(off: float) ->
     assert find_unique_speed(lines([*chatter[:5], *STRAYS]), BIN, 4, TURN / (1 + off)) is None
 
 
-def test_multiples_of_chatter_alone_are_no_speed_of_other_teeth() -> None:
-    """A fifth of the chatter frequency is near the set speed, but four teeth make no fifth multiples only."""
-    chatter = [5 * k * TURN for k in range(1, 9)]
-    assert find_unique_speed(lines(chatter), BIN, 4, TURN) is None
-    speed = find_unique_speed(lines(chatter), BIN, 5, TURN)
-    assert speed is not None
-    assert speed.frequency == pytest.approx(TURN, rel=1e-9)
+def test_two_speeds_with_as_many_lines_are_none() -> None:
+    comb = [k * TURN for k in range(4, 40, 4)]
+    other = [k * 1.01 * TURN for k in range(4, 40, 4)]
+    assert find_unique_speed(lines(comb), BIN, 4, TURN) is not None
+    assert find_unique_speed(lines([*comb, *other]), BIN, 4, TURN) is None
+
+
+@pytest.mark.parametrize(("teeth", "is_found"), [(2, True), (3, False), (4, True)])
+def test_even_multiples_only_are_no_speed_of_three_teeth(teeth: int, is_found: bool) -> None:
+    """Half of a chatter frequency is near the set speed, but three teeth make no even multiples only."""
+    speed = find_unique_speed(lines([2 * k * TURN for k in range(1, 9)]), BIN, teeth, TURN)
+    assert (speed is not None) is is_found
 
 
 def spectra_of(*axes: Sequence[tuple[float, float]], seconds: float = 1.0) -> tuple[list[Spectrum], list[Spectrum]]:

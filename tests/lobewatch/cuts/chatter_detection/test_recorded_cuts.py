@@ -41,7 +41,7 @@ NEAR = (1 / 1.1, 1 / 0.9)
 """Depths beside that of the cut where it must do the same, relative."""
 SHARES = 4
 """Depths at which each cut is simulated."""
-RIGHT, RIGHT_BY_LIMIT, NOT_TOLD = 0.98, 0.96, 0.05
+RIGHT, RIGHT_BY_LIMIT, NOT_TOLD = 0.98, 0.97, 0.05
 """Shares of right verdicts by the tip and by the limit, and of none; most cuts wrong by the limit do not chatter."""
 Random = np.random.Generator
 

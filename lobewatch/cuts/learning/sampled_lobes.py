@@ -44,10 +44,8 @@ LOWEST_FREQUENCY = 0.2
 """Lowest frequency over that of the slowest mode; chosen."""
 MAX_LOBE_GAIN = 20.0
 """Largest limit over the lowest one that counts; chosen."""
-MAX_WAVES = 60
-"""Waves between two teeth above which all speeds have the lowest limit.
-
-Pockets there are at most 20 % deeper on average over the uncertainty of the speed."""
+MAX_WAVES = 100
+"""Waves between two teeth above which all speeds have the lowest limit; pockets there are at most 20 % deeper."""
 
 
 _Points: TypeAlias = tuple[Indices, Floats, Floats]
